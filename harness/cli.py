@@ -24,7 +24,7 @@ from harness.commands.inspect import add_inspect
 from harness.commands.list import add_list
 from harness.commands.live import add_live
 from harness.commands.mocap import add_mocap
-from harness.commands.output import describe_ending, print_last
+from harness.commands.output import announce, describe_ending, print_last
 from harness.commands.paper import add_paper
 from harness.commands.placement import add_placement
 from harness.commands.plot import add_plot
@@ -37,6 +37,7 @@ from harness.commands.sweep import add_sweep
 from harness.commands.table import add_table
 from harness.commands.trust import add_trust
 from harness.commands.validate import add_validate
+from harness.commands.verb_parser import VerbParser
 from harness.commands.view import add_view
 from harness.core.interrupts import accept_interrupts, hold_interrupts
 from harness.core.package_data import VERSION
@@ -84,10 +85,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                 args = build_parser().parse_args(words)
                 as_json, prints_file = args.json, getattr(args, "prints_file", False)
                 outcome = _run_verb(words, args)
-        except SystemExit as ended:  # argparse has printed the help or its complaint
-            outcome = Outcome.REFUSED if ended.code else Outcome.PASS
-            text = json.dumps({"outcome": outcome.word}) if as_json else outcome.word
-            sys.exit(print_last(text + "\n" if ended.code else "", outcome))
+        except SystemExit:  # argparse has printed the help
+            sys.exit(print_last("", Outcome.PASS))
         except (KeyboardInterrupt, Exception) as error:
             outcome, content = describe_ending(words, error)
         if prints_file and not as_json:  # stdout is the content of a file
@@ -112,6 +111,7 @@ def _run_verb(words: Sequence[str], args: argparse.Namespace) -> Outcome:
         check_command_line(words)
         check_words(list(vars(args).values()))
         with safe_import_path():  # MuJoCo starts a process too
+            announce(f"{words[0]}: loading")
             outcome: Outcome = args.action(args)
     except SystemExit as ended:  # of a method or a library: its code is none of ours
         raise RuntimeError(f"a part of the program asked to exit with {ended.code!r}") from ended
@@ -135,7 +135,7 @@ class _VerbGroup:
 
 def build_parser() -> argparse.ArgumentParser:
     """The parser of the command line, with every verb."""
-    parser = argparse.ArgumentParser(
+    parser = VerbParser(
         prog="harness",
         usage="harness VERB ... (harness VERB --help explains a verb)",
         description="Measure how well body-worn 6-DOF trackers are turned into full-body motion.",

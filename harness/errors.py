@@ -7,6 +7,7 @@ There is a type for each thing that the reader can do about it. A message names 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from enum import Enum
+from itertools import islice
 from pathlib import Path
 
 
@@ -96,6 +97,16 @@ class SystemFault(HarnessError):
         return f"{self.what} {self.advice}"
 
 
+def suggest(name: str, known: Iterable[str]) -> str:
+    """The question " Did you mean 'ridge'?" after a wrong name, or "" where no known name is near."""
+    import difflib  # only for a message: the pytest plugin is loaded by every pytest
+
+    folded, word = {each.casefold(): each for each in islice(known, 1000)}, name.casefold()
+    parts = [each for each in folded if len(word) > 2 and word in each]
+    near = difflib.get_close_matches(word, folded, n=1) or parts
+    return f" Did you mean {folded[near[0]]!r}?" if near else ""
+
+
 class UnknownName(HarnessError):
     """A station, bone, method, clip or scenario key that does not exist."""
 
@@ -104,13 +115,9 @@ class UnknownName(HarnessError):
         self.kind, self.name, self.known = self.args
 
     def __str__(self) -> str:
-        import difflib  # only for a message: the pytest plugin is loaded by every pytest
-
         name, known = shorten(self.name, 100), [shorten(each, 100) for each in self.known]
-        near = difflib.get_close_matches(name, known[:1000], n=1)
-        hint = f" Did you mean {near[0]!r}?" if near else ""
         choices = shorten(", ".join(known) or "none", 2 * MAX_TEXT)
-        return f"{self.place}no {shorten(self.kind)} called {name!r}.{hint} Known: {choices}."
+        return f"{self.place}no {shorten(self.kind)} called {name!r}.{suggest(name, known)} Known: {choices}."
 
 
 class RenamedKey(HarnessError):
@@ -137,7 +144,10 @@ class ShapeError(HarnessError):
 
 
 class BadFile(HarnessError):
-    """A file that cannot be used. The message tells what was found, what was expected, and what to try."""
+    """A file that cannot be used. The message tells what was found, what was expected, and what to try.
+
+    `expected` is empty where `found` tells it.
+    """
 
     def __init__(self, path: Path | str, found: str, expected: str, advice: str, line: int | None = None) -> None:
         super().__init__(str(path), found, expected, advice, line)
@@ -146,7 +156,7 @@ class BadFile(HarnessError):
     def __str__(self) -> str:
         path, found, expected, advice = map(shorten, (self.path, self.found, self.expected, self.advice))
         where = path if self.line is None else f"{path}, line {self.line}"
-        return f"{where}: {found}; expected {expected}. {advice}".rstrip()
+        return f"{where}: {found}{expected and f'; expected {expected}'}. {advice}".rstrip()
 
 
 class BadInput(HarnessError):

@@ -167,7 +167,7 @@ def prepared_work(folder: Path, *, device: bool = False) -> Iterator[Work]:
         )
         with program:
             assert program.stderr is not None
-            said = [program.stderr.readline(), program.stderr.readline()]
+            said = [program.stderr.readline() for _ in range(3)][1:]
             try:
                 yield Work(folder, said[1].split()[3].rstrip(",;"))
             finally:

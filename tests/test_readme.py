@@ -1,8 +1,10 @@
 """The commands, code and links of the README and of the documents work."""
 
+import ast
 import json
 import re
 import shlex
+import subprocess
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +22,7 @@ from harness.experiment.scenarios import load_scenario
 from harness.reconstruct import list_methods, make_method
 from harness.report.run.text import run_table
 from harness.results import read_summary
+from harness.study.trust.plan import load_plan
 from harness.testing.contract_case import make_case
 from tests.short_demo import short_demo
 from tests.test_doors import DOORS
@@ -188,8 +191,42 @@ def test_the_table_of_the_readme_is_the_demo_s(tmp_path: Path, behaviour: str) -
 
 
 def commands(text: str) -> list[str]:
-    """What follows `harness` in every indented line of code, without its comment and redirections."""
-    return re.findall(r"^    harness (.*?)(?:  +#.*)?$", text, re.MULTILINE)
+    """What follows `harness` in every line of code, without its comment and redirections."""
+    return re.findall(r"^(?: {4})?harness (.*?)(?:  +#.*)?$", text, re.MULTILINE)
+
+
+def blocks(text: str, language: str) -> list[str]:
+    """The fenced blocks of code of a language, as in the file."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_code_can_be_copied_from_the_file_of_a_page(page: Path) -> None:
+    """Fenced code parses as it is. Indented Python, or the end of an indented here-document, would not."""
+    text = page.read_text(encoding="utf-8")
+    for block in blocks(text, "python"):
+        ast.parse(block)
+    for block in blocks(text, "toml"):
+        tomllib.loads(block)
+    for block in blocks(text, "sh"):
+        checked = subprocess.run(["/bin/bash", "-n"], input=block, capture_output=True, text=True, check=False)
+        assert (checked.returncode, checked.stderr) == (0, "")
+    assert re.findall(r"^ +(?:from \S+ import .*|import \w+|with .*:|.*<<.*)$", prose(text), re.MULTILINE) == []
+
+
+def prose(text: str) -> str:
+    """The text without its fenced blocks."""
+    return re.sub(r"^```.*?^```$", "", text, flags=re.DOTALL | re.MULTILINE)
+
+
+def test_the_files_of_the_laboratory_are_those_of_the_raw_page(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "hil.md").read_text(encoding="utf-8")
+    script = "".join(block for block in blocks(page, "sh") if "<<" in block)
+    subprocess.run(["/bin/bash", "-e"], input=script, cwd=tmp_path, text=True, check=True)
+    assert {path.name for path in tmp_path.iterdir()} == {"hidden.toml", "motion.toml", "plan.toml"}
+    assert load_scenario(tmp_path / "hidden.toml").motion.test[0] == "rig_p1_04"
+    plan = load_plan(tmp_path / "plan.toml")
+    assert len(load_scenario(tmp_path / plan.scenario).motion.test) == 12
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

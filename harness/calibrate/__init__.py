@@ -5,16 +5,15 @@ from typing import TYPE_CHECKING
 from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
-    from harness.calibrate.calibration_file import EXPECTED, CalibrationFile, read_calibration, write_calibration
-    from harness.calibrate.calibration_report import report_pose_calibration, report_tpose_calibration
-    from harness.calibrate.guided_calibration import (
-        Calibrator,
-        GuidedPose,
-        Notifier,
-        PoseDisplay,
-        PoseGuide,
-        TPoseCalibrator,
+    from harness.calibrate.calibration_file import (
+        EXPECTED,
+        CalibrationFile,
+        CalibrationOutcome,
+        read_calibration,
+        write_calibration,
     )
+    from harness.calibrate.calibration_report import report_pose_calibration, report_tpose_calibration
+    from harness.calibrate.guided_calibration import GuidedPose, Notifier, PoseDisplay, PoseGuide
     from harness.calibrate.hold import UnusableHold
     from harness.calibrate.kim2012_calibration import SensorMaps, calibrate_kim2012
     from harness.calibrate.liu2011_calibration import calibrate_liu2011
@@ -33,8 +32,8 @@ __all__ = [
     "HOLD_S",
     "POSES",
     "CalibrationFile",
+    "CalibrationOutcome",
     "CalibrationPose",
-    "Calibrator",
     "GuidedPose",
     "Notifier",
     "PerformerPose",
@@ -46,7 +45,6 @@ __all__ = [
     "PoseGuide",
     "SensorMaps",
     "SkeletonPrior",
-    "TPoseCalibrator",
     "UnusableHold",
     "calibrate_kim2012",
     "calibrate_liu2011",

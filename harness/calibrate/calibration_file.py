@@ -68,6 +68,14 @@ class CalibrationFile:
         return replace(self, calibration=self.calibration.of_stations(stations))
 
 
+@dataclass(frozen=True, eq=False)
+class CalibrationOutcome:
+    """A calibration and its report."""
+
+    file: CalibrationFile
+    lines: list[str]
+
+
 @dataclass(frozen=True)
 class _RoomTable:
     world_from_tracker: tuple[float, float, float, float]

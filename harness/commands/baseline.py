@@ -11,7 +11,7 @@ from harness.errors import Outcome
 def add_baseline(verbs: Verbs) -> None:
     text = "save the results of a finished run as a baseline"
     verb = add_verb(verbs, "baseline", text, run_baseline)
-    verb.add_argument("what", choices=["save"], help="the only action")
+    verb.add_argument("what", metavar="ACTION", choices=["save"], help="save, the only action")
     verb.add_argument("name", metavar="NAME", help="name of the baseline, written to results/baselines/NAME")
     verb.add_argument("run", metavar="RUN", type=Path, help="folder written by `harness run` or `harness sweep`")
     verb.add_argument("--force", action="store_true", help="replace an existing baseline")

@@ -13,6 +13,7 @@ from harness.commands.flags import (
     add_line_flags,
     add_verb,
     line_options,
+    output_folder,
     parse_names,
     positive_int,
     refuse_flags_of_others,
@@ -24,8 +25,7 @@ from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 
 if TYPE_CHECKING:
-    from harness.calibrate import PoseDisplay
-    from harness.experiment import CalibrationOutcome
+    from harness.calibrate import CalibrationOutcome, PoseDisplay
 
 _SOURCES = ("recording", "port", "simulate", "sheet")
 _SESSION_FLAGS = ("scenario", "stations", "kind", "clip", "out")
@@ -46,7 +46,7 @@ def add_calibrate(verbs: Verbs) -> None:
     verb.add_argument(
         "--simulate", type=positive_int, metavar="N", help="calibrate N simulated performers and print the errors"
     )
-    verb.add_argument("--sheet", type=Path, metavar="DIR", help="only draw the poses, as PNG files in DIR")
+    verb.add_argument("--sheet", type=output_folder, metavar="DIR", help="only draw the poses, as PNG files in DIR")
     text = "tracker, as for `harness live`; the poses are shown to the performer"
     verb.add_argument("--port", help=text)
     text = "scenario with the stations and their nominal mounts (see `harness list`)"
@@ -60,7 +60,7 @@ def add_calibrate(verbs: Verbs) -> None:
     add_line_flags(verb)
     text = "show the poses in a window, or as PNG files in the folder --pictures"
     verb.add_argument("--view", choices=["window", "frames"], help=text)
-    verb.add_argument("--pictures", type=Path, metavar="DIR", help="folder of --view frames")
+    verb.add_argument("--pictures", type=output_folder, metavar="DIR", help="folder of --view frames")
     text = "with --simulate: standard deviation of each hinge from each pose [deg] (default 2.5)"
     verb.add_argument("--miss", type=float, metavar="DEG", help=text)
     verb.add_argument(

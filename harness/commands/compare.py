@@ -15,9 +15,10 @@ _EVERYTHING = "everything"
 def add_compare(verbs: Verbs) -> None:
     text = "tell whether result B is worse than A, or one method worse than another"
     verb = add_verb(verbs, "compare", text, run_compare)
-    verb.add_argument("a", metavar="A", help=f"reference: {_SIDE_HELP}")
-    verb.add_argument("b", metavar="B", nargs="?", help="result to compare with A (default: A itself, with --methods)")
-    text = "compare method A of result A with method B of result B; one name: the same method of both"
+    text = f"{_SIDE_HELP}; NAME=A names it. The first is the reference. One alone: compare its --methods"
+    verb.add_argument("sides", metavar="A", nargs="+", help=text)
+    verb.add_argument("--reference", metavar="NAME", help="compare the others with this side instead of the first")
+    text = "compare method A of result A with method B of result B; one name: the same method of all results"
     verb.add_argument("--methods", metavar="A,B", help=text)
     verb.add_argument("--metrics", metavar="M,N", help="metrics that decide the outcome (see `harness list`)")
     text = "let these conditions, `coverage` or `cells` (without a partner) differ; without names, everything"
@@ -26,25 +27,29 @@ def add_compare(verbs: Verbs) -> None:
 
 
 def run_compare(args: argparse.Namespace) -> Outcome:
-    from harness.compare import compare_runs
+    from harness.compare import compare_sides, name_sides
     from harness.report.comparison.page import comparison_text, write_comparison_page
+    from harness.report.comparison.set_page import set_text, write_set_page
 
-    if args.b is None and not args.methods:
-        raise BadInput(f"{args.a} alone.", "Name two results, or two methods of one with --methods a,b.")
     methods = split_list(args.methods)
-    if len(methods) > 2:
-        raise BadInput(f"--methods {args.methods} names {len(methods)} methods.", "Name one or two.")
-    comparison = compare_runs(
-        args.a,
-        args.b,
-        methods=(methods[0], methods[-1]) if methods else None,
-        metrics=args.metrics.split(",") if args.metrics else None,
-        allow=args.allow.split(",") if args.allow else None,
+    if len(args.sides) == 1 and not methods:
+        raise BadInput(f"{args.sides[0]} alone.", "Name two results, or two methods of one with --methods a,b.")
+    found = compare_sides(
+        name_sides(args.sides, shorten=len(args.sides) > 2),
+        reference=args.reference,
+        methods=methods,
+        metrics=split_list(args.metrics) or None,
+        allow=split_list(args.allow) if args.allow else None,
     )
     with show_steps("parts of the report"):
-        page = write_comparison_page(comparison, args.html) if args.html else None
-    lines = [comparison_text(comparison), *([f"page: {page}"] if page else [])]
+        if len(found.comparisons) == 1:
+            (comparison,) = found.comparisons
+            page, text = args.html and write_comparison_page(comparison, args.html), comparison_text(comparison)
+            content = record_content(comparison, page=page)
+        else:
+            page, text = args.html and write_set_page(found, args.html), set_text(found)
+            each = [{**record_content(one), "outcome": one.outcome.word} for one in found.comparisons]
+            content = {**record_content(found, page=page), "comparisons": each}
+    lines = [text, *([f"page: {page}"] if page else [])]
     following = () if page else (*this_words(), "--html", "comparison.html")
-    return print_result(
-        args, record_content(comparison, page=page), *lines, outcome=comparison.outcome, following=following
-    )
+    return print_result(args, content, *lines, outcome=found.outcome, following=following)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.core.options import expand_alternatives, split_outside_brackets
+from harness.core.output_place import place_fault
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) ->
     if "seed" in flags:
         verb.add_argument("--seed", type=int, help="seed instead of the scenario's")
     if "out" in flags:
-        verb.add_argument("--out", type=Path, metavar="DIR", help="folder to write")
+        verb.add_argument("--out", type=output_folder, metavar="DIR", help="folder to write")
     if "jobs" in flags:
         text = "clips computed at the same time (default 1, of the demo 2)"
         verb.add_argument("--jobs", type=process_count, default=1, metavar="N", help=text)
@@ -149,6 +150,13 @@ def line_options(args: argparse.Namespace, port: str) -> dict[str, Any]:
     return options
 
 
+def output_folder(text: str) -> Path:
+    """A folder that can be written, or made, for argparse: a verb that works for long refuses another at once."""
+    if fault := place_fault(Path(text)):
+        raise argparse.ArgumentTypeError(fault)
+    return Path(text)
+
+
 def is_whole_number(text: str) -> bool:
     """Whether a text is one to nine digits. `str.isdigit` accepts `²`, and `int` refuses more than 4,300 digits."""
     return text.isascii() and text.isdecimal() and len(text) < 10
@@ -181,8 +189,11 @@ def positive_float(text: str) -> float:
 
 
 def split_list(text: str | None) -> list[str]:
-    """The entries of a list that is separated by commas outside brackets; [] without one."""
-    return split_outside_brackets(text, ",") if text else []
+    """The entries of a list that is separated by commas outside brackets; [] without one; BadInput for an empty one."""
+    entries = [entry.strip() for entry in split_outside_brackets(text, ",")] if text else []
+    if not all(entries):
+        raise BadInput(f"The list {text!r} has an empty name.", "Separate names by commas, such as ik,ridge.")
+    return entries
 
 
 def parse_methods(text: str) -> tuple[str, ...]:
@@ -240,12 +251,9 @@ def parse_station_map(text: str) -> dict[str, str]:
 
 def parse_names(text: str) -> list[str]:
     """Station names separated by commas; BadInput for an empty name."""
-    names = [name.strip() for name in text.split(",")]
     if "=" in text:
         raise BadInput(f"--stations {text!r} names stations of a device.", "No device is read here: give names alone.")
-    if not all(names):
-        raise BadInput(f"--stations {text!r} names no station.", "Separate names by commas: head,torso.")
-    return names
+    return split_list(text)
 
 
 class _Refuse(argparse.Action):

@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.commands.flags import refuse_flags, repeat_flags
 from harness.commands.output import print_result, this_command
-from harness.errors import BadInput, Outcome, UnknownName
+from harness.errors import Outcome, UnknownName
 from harness.report.coverage.content import (
     CoverageContent,
     CoverageRow,
@@ -44,13 +44,14 @@ def inspect_constellation(args: argparse.Namespace) -> Outcome:
     if args.clip is None:
         refuse_flags(args, ["stations", "rate"], "without --clip", "It is for the performer that --clip names.")
     page = args.out or Path("results") / "coverage" / f"{args.file.stem}.html"
-    if args.out is not None and args.out.exists() and not args.force:
-        raise BadInput(f"{args.out} exists.", "Name another file, or use --force.")
-    constellation = _load(args.file)
+    from harness.core.files import require_writable
     from harness.core.progress import report_step, show_steps
     from harness.report.coverage.page import coverage_page
     from harness.report.kit import render_text, write_page
 
+    if args.out is not None:
+        require_writable(args.out, "a page", force=args.force)
+    constellation = _load(args.file)
     with show_steps("parts"):
         report_step("coverage")
         content = _content(args, constellation)

@@ -14,6 +14,7 @@ from harness.commands.flags import (
     add_line_flags,
     add_verb,
     line_options,
+    output_folder,
     positive_float,
     repeat_flags,
 )
@@ -24,13 +25,15 @@ from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 
 if TYPE_CHECKING:
     from harness.calibrate import CalibrationFile
-    from harness.experiment import Playback
+    from harness.experiment import CalibrationSession, Playback
     from harness.stream import EventCounter
     from harness.stream.is900 import DriverConfig, Tracker
     from harness.stream.recording import RecordingSwitch
 
 _CALIBRATION_KINDS = ("exact", "tpose", "poses")
 _WARM_UP_FRAMES = 200
+_TPOSES = 5
+"""Number of T-poses that may fail before calibration is given up [choice]."""
 _RATE_TOLERANCE = 0.02
 """Relative difference allowed between the device's rate and the rate that a method learnt at [choice]."""
 
@@ -53,15 +56,15 @@ def add_live(verbs: Verbs) -> None:
     text = "frames per second of the tracker and of the examples (default: the scenario's)"
     add_line_flags(verb, text)
     text = (
-        "exact: the scenario's mounts and body; tpose: mounts from a T-pose in the first seconds; poses: mounts and "
+        "exact: the scenario's mounts and body; tpose: mounts from a T-pose, held first; poses: mounts and "
         "bone lengths from eight poses, held first; FILE: written by `harness calibrate` (default exact)"
     )
     verb.add_argument("--calibration", metavar="exact|tpose|poses|FILE", default="exact", help=text)
     text = "show the motion in a window or in the browser, or write PNG files into the folder --out"
     verb.add_argument("--view", choices=["window", "browser", "frames"], help=text)
     verb.add_argument("--no-browser", action="store_true", help="print the address of --view browser alone")
-    text = "folder of --view frames, and of recordings that --view browser starts (default: this one)"
-    verb.add_argument("--out", type=Path, metavar="DIR", help=text)
+    text = "folder of --view frames, and of recordings and calibrations that --view browser starts (default: this one)"
+    verb.add_argument("--out", type=output_folder, metavar="DIR", help=text)
     text = "send the VMC protocol over UDP; without HOST, to this computer"
     verb.add_argument("--vmc", metavar="[HOST:]PORT", help=text)
     text = "open the streams NAME-qpos and NAME-joints of the Lab Streaming Layer"
@@ -84,10 +87,20 @@ def run_live(args: argparse.Namespace) -> Outcome:
 
 
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
-    from harness.calibrate import TPoseCalibrator
     from harness.commands import live_summary
+    from harness.core.files import require_writable
+    from harness.core.package_data import VERSION
     from harness.experiment.methods import DEFAULT_ISOLATION, resolve_method
-    from harness.live import JitterProbe, LiveOptions, OutputOptions, SessionSetup, open_outputs, run_session, warm_up
+    from harness.live import (
+        JitterProbe,
+        LiveOptions,
+        OutputOptions,
+        SessionControl,
+        SessionSetup,
+        open_outputs,
+        run_session,
+        warm_up,
+    )
     from harness.stream import EventCounter
     from harness.stream.recording import RecordingSwitch
 
@@ -102,31 +115,28 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         out=args.out,
         force=args.force,
     )
+    for path in filter(None, (args.bvh, args.poses)):  # before the performer holds poses
+        require_writable(path, "motion", force=args.force)
     stations = parse_device_stations(args.stations)
     playback_options = PlaybackOptions(args.scenario, stations, args.clip, args.rate, args.seed, args.mocap)
     playback = open_playback(playback_options)
     config = _driver_config(args, playback)
     method = resolve_method(args.method, DEFAULT_ISOLATION)
     events = EventCounter(lambda text: print_status(f"line: {text}"))
-    if args.calibration == "poses":
-        stored = _calibrate_by_poses(args.port, config, playback, events, playback_options)
-        playback = playback.with_calibration(stored)
-    elif args.calibration not in _CALIBRATION_KINDS:
+    if args.calibration not in _CALIBRATION_KINDS:
         stored = _read_calibration(args.calibration)
         playback = playback.with_calibration(stored, named=isinstance(stations, list), say=print_status)
+    if guided := _guided_calibrations(args, playback).get(args.calibration):
+        playback = playback.with_calibration(_calibrate_performer(args.port, config, playback, events, guided))
     body, calibration = playback.performer_calibration.body, playback.calibration
-    tpose = args.calibration == "tpose"  # the first seconds of the session calibrate
-    setup = SessionSetup(
-        body.skeleton,
-        tuple(playback.scenario.stations),
-        playback.tracker.rate_hz,
-        None if tpose else (calibration.world_from_tracker, calibration.tracker_origin_m),
-        f"{args.method} on {args.port}",
-    )
+    names, title = tuple(playback.scenario.stations), f"{args.method} on {args.port}"
+    calibrations = _guided_calibrations(args, playback)
+    setup = SessionSetup(body.skeleton, names, playback.tracker.rate_hz, title, calibrations)
     with ExitStack() as opened:
-        recorder = RecordingSwitch()
-        outputs = open_outputs(output_options, setup, recorder, opened, print_status)
-        device = opened.enter_context(_open_device(args.port, config, playback, events, recorder))
+        note = {"source": "live", "port": args.port, "harness": VERSION}
+        control = SessionControl(RecordingSwitch(note))
+        outputs = open_outputs(output_options, setup, control, opened, print_status)
+        device = opened.enter_context(_open_device(args.port, config, playback, events, control.recorder))
         examples = len(playback.clip_evaluation.subject.example_names)
         print_status(f"learning {args.method} from {examples} clips of {playback.scenario.name}")
         with redirect_stdout(sys.stderr):  # a method may print; stdout is for data
@@ -140,9 +150,10 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
                 device,
                 body,
                 reconstructor,
-                TPoseCalibrator(playback.body, playback.mounts) if tpose else calibration,
+                calibration,
                 outputs,
                 options,
+                control=control,
                 say=print_status,
                 progress=show_progress,
             )
@@ -161,8 +172,8 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     if result.stopped and not result.poses and not result.failed:
         outcome = Outcome.INTERRUPTED
     lines = (*live_summary.lines(result, jitter), f"line: {', '.join(line)}")
-    names = args.stations if "=" in (args.stations or "") else ",".join(setup.stations)
-    following = ["record", args.port, "take.rec", "--stations", names, *repeat_flags(args, "rate", *LINE_FLAGS)]
+    worn = args.stations if "=" in (args.stations or "") else ",".join(setup.stations)
+    following = ["record", args.port, "take.rec", "--stations", worn, *repeat_flags(args, "rate", *LINE_FLAGS)]
     return print_result(args, content, *lines, outcome=outcome, following=following)
 
 
@@ -213,21 +224,39 @@ def _read_calibration(name: str) -> "CalibrationFile":
     return calibration
 
 
-def _calibrate_by_poses(
-    port: str, config: "DriverConfig", playback: "Playback", events: "EventCounter", options: PlaybackOptions
-) -> "CalibrationFile":
-    """Calibrate from eight poses before methods learn, so that they learn on the performer's bone lengths."""
+def _guided_calibrations(args: argparse.Namespace, playback: "Playback") -> "dict[str, CalibrationSession]":
+    """Calibrations by held poses, by kind, of the stations of a playback; `tpose` is of its body."""
     from harness.experiment import CalibrationSession
+
+    stations, skeleton = tuple(playback.scenario.stations), playback.performer_calibration.body.skeleton
+    return {
+        "tpose": CalibrationSession(args.scenario, stations, "tpose", folder=args.mocap, skeleton=skeleton),
+        "poses": CalibrationSession(args.scenario, stations, folder=args.mocap),
+    }
+
+
+def _calibrate_performer(
+    port: str, config: "DriverConfig", playback: "Playback", events: "EventCounter", session: "CalibrationSession"
+) -> "CalibrationFile":
+    """Calibrate by held poses before methods learn, so that they learn on the performer's bone lengths.
+
+    A T-pose that cannot be used is asked for again, up to `_TPOSES` times.
+    """
+    from harness.calibrate import UnusableHold
     from harness.live import PoseTerminal
 
-    session = CalibrationSession(options.scenario, tuple(playback.scenario.stations), folder=options.folder)
     with _open_device(port, config, playback, events) as device:
-        terminal = PoseTerminal(session.body.skeleton, sys.stderr)
-        try:
-            held = session.collect_poses(device, print_status, [terminal]).holds
-        finally:
-            terminal.close()
-    found = session.solve(held, port)
+        for left in reversed(range(_TPOSES if session.kind == "tpose" else 1)):
+            terminal = PoseTerminal(session.body.skeleton, sys.stderr)
+            try:
+                found = session.solve(session.collect_poses(device, print_status, [terminal]).holds, port)
+                break
+            except UnusableHold as error:
+                if not left:
+                    raise
+                print_status(f"{error} Trying again.")
+            finally:
+                terminal.close()
     for line in found.lines:
         print_status(line)
     return found.file

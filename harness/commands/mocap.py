@@ -1,11 +1,10 @@
 """The verb `mocap`: list a library of real motion, or download one."""
 
 import argparse
-import sys
 from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, repeat_flags
-from harness.commands.output import print_result
+from harness.commands.flags import Verbs, add_verb, output_folder, repeat_flags
+from harness.commands.output import print_result, print_status
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 
@@ -17,7 +16,8 @@ def add_mocap(verbs: Verbs) -> None:
     fetch = add_verb(inner, "fetch", "download clips of CMU's motion capture database", run_mocap_fetch)
     fetch.add_argument("database", choices=["cmu"], help="the database")
     fetch.add_argument("--subjects", required=True, metavar="13,14", help="CMU's subject numbers")
-    fetch.add_argument("--out", type=Path, default=Path("mocap"), metavar="DIR", help="folder to write (default mocap)")
+    text = "folder to write (default mocap)"
+    fetch.add_argument("--out", type=output_folder, default=Path("mocap"), metavar="DIR", help=text)
     fetch.add_argument("--url", help="address of a mirror with the same layout")
 
 
@@ -27,7 +27,7 @@ def run_mocap_list(args: argparse.Namespace) -> Outcome:
     library = MotionLibrary(find_library_folders(args.mocap))
     entries = library.entries()
     for note in ignored_paths_note(library.ignored_paths):
-        print(note, file=sys.stderr)
+        print_status(note)
     if not entries:
         raise BadInput(
             "The library holds no clips.", "It may hold .amc files with their .asf, .bvh, .mvnx, .npz and .c3d files."

@@ -29,6 +29,7 @@ def print_data(text: str) -> bool:
 
     SystemFault when the text cannot be written.
     """
+    show_progress("")  # an announcement ends
     try:
         print(text, end="", flush=True)
     except BrokenPipeError:
@@ -49,14 +50,14 @@ def describe_ending(words: Sequence[str], error: BaseException) -> tuple[Outcome
     """
     kept = " ".join(getattr(error, "__notes__", ()))
     if was_interrupted(error):
-        print(f"harness: stopped. {kept or _KEPT}", file=sys.stderr)
+        print_status(f"harness: stopped. {kept or _KEPT}")
         return Outcome.INTERRUPTED, {}
     if isinstance(error, HarnessError) and error.outcome is not Outcome.FAILED:
-        print(f"harness: {shorten(str(error), _MAX_LINE)}", file=sys.stderr)
+        print_status(f"harness: {shorten(str(error), _MAX_LINE)}")
         return error.outcome, {"error": shorten(str(error), _MAX_LINE)}
     cause, advice = describe_fault(error)
     line = shorten(f"{cause} {kept or _KEPT} {advice} ({save_traceback(error)})", _MAX_LINE)
-    print(f"harness: failed: {line}", file=sys.stderr)
+    print_status(f"harness: failed: {line}")
     return Outcome.FAILED, {"error": line}
 
 
@@ -118,6 +119,11 @@ def _describe_progress(out: Path) -> str:
 def print_status(line: str) -> None:
     """Print a line to stderr, over the line of `show_progress`; stdout is for data."""
     print(f"\r{line}\033[K" if sys.stderr.isatty() else line, file=sys.stderr, flush=True)
+
+
+def announce(line: str) -> None:
+    """Print to stderr what a verb does before its first result; on a terminal the next line replaces it."""
+    (show_progress if sys.stderr.isatty() else print_status)(line)
 
 
 def print_caveat(path: object, caveat: str) -> None:

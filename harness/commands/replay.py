@@ -85,7 +85,7 @@ def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcom
         str(summary),
         "",
         _format_counts(stream),
-        *(f"{e['monotonic_s']:.3f} s: {e['text']}" for e in recording.events),
+        *(f"{e['elapsed_s']:.3f} s: {e['text']}" for e in recording.events),
         *format_exchanges(recording.answers),
     ]
     if args.frames and not args.json:  # the frames are the data

@@ -1,11 +1,10 @@
 """The verb `run`: run a scenario and write its report."""
 
 import argparse
-import sys
 from pathlib import Path
 
 from harness.commands.flags import Verbs, add_isolation_flags, add_verb, parse_methods, read_isolation
-from harness.commands.output import long_work, print_result, this_command
+from harness.commands.output import long_work, print_result, print_status, this_command
 from harness.core.progress import show_steps
 from harness.errors import Outcome
 
@@ -40,6 +39,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
 
     from harness.experiment import run
     from harness.experiment.scenarios import check_scenario, load_scenario
+    from harness.report.run.losses import loss_sentence
     from harness.report.run.text import run_table
     from harness.results import read_summary
 
@@ -64,7 +64,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
     if args.report:
         from harness.report.run.page import write_run_page
 
-        print("writing the report", file=sys.stderr)
+        print_status("writing the report")
         with show_steps("parts of the report"):
             page = write_run_page(out)
     summary = read_summary(out)
@@ -73,6 +73,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         args,
         content,
         run_table(summary, short=not args.all),
+        *filter(None, [loss_sentence(out)]),
         f"report: {page}" if page else f"results: {out}",
         outcome=outcome,
         following=["view", out] if outcome is Outcome.PASS else ["status", out],

@@ -9,10 +9,11 @@ from harness.errors import Outcome
 
 
 def add_table(verbs: Verbs) -> None:
-    text = "print the results of a run as a table for a paper: means with intervals, in LaTeX, Markdown or CSV"
+    text = "print the results of one run or several as a table for a paper: means with intervals"
     verb = add_verb(verbs, "table", text, run_table_verb)
     verb.set_defaults(prints_file=True)
-    verb.add_argument("run", type=Path, help="folder written by `harness run`")
+    text = "folder of a run or baseline, or name of a baseline; of several each has a column, and NAME=RUN names it"
+    verb.add_argument("runs", metavar="RUN", nargs="+", help=text)
     text = "latex (with booktabs), markdown or csv (default markdown)"
     verb.add_argument("--format", default="markdown", metavar="FORMAT", help=text)
     text = "metrics of the columns (default joint_angle_mean_deg,mpjpe_mm; see `harness list`)"
@@ -27,13 +28,16 @@ def add_table(verbs: Verbs) -> None:
 def run_table_verb(args: argparse.Namespace) -> Outcome:
     from dataclasses import asdict
 
+    from harness.compare import name_sides
     from harness.report.figures.table import DEFAULT_METRICS
     from harness.report.figures.writer import write_results_table
+    from harness.results.files import CELLS_FILE, find_results
 
+    several, folder = len(args.runs) > 1, find_results(args.runs[0])
     written = write_results_table(
-        args.run,
+        name_sides(args.runs) if several else folder,
         args.format,
-        metrics=args.metrics.split(",") if args.metrics else DEFAULT_METRICS,
+        metrics=split_list(args.metrics) or DEFAULT_METRICS,
         methods=split_list(args.methods),
         condition=args.condition,
         by_behaviour=args.by_behaviour,
@@ -43,5 +47,9 @@ def run_table_verb(args: argparse.Namespace) -> Outcome:
     content = {**asdict(written.table), "file": args.out and str(args.out)}
     line = written.text.removesuffix("\n") if args.out is None else f"table: {args.out}"
     metric = ["--metric", args.metrics.split(",")[0]] if args.metrics else []
-    flags = repeat_flags(args, "methods", "condition")
-    return print_result(args, content, line, following=["plot", args.run, "--kind", "ranking", *metric, *flags])
+    following = ["plot", args.runs[0], "--kind", "ranking", *metric, *repeat_flags(args, "methods", "condition")]
+    if several:
+        following = ["compare", *args.runs]
+    elif (folder / CELLS_FILE).exists():  # no figure shows a baseline
+        following = []
+    return print_result(args, content, line, following=following)

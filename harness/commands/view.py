@@ -41,23 +41,25 @@ def add_view(verbs: Verbs) -> None:
 
 
 def run_view(args: argparse.Namespace) -> Outcome:
-    from harness.view import check_movie
+    from harness.core.files import require_writable, write_output
+    from harness.view import check_movie, write_page
 
     if args.save is not None:
         check_movie(args.save)
-    for path in (args.save, args.out):
-        if path is not None and path.exists() and not args.force:
-            raise BadInput(f"{path} exists.", "Name another file, or use --force.")
+    for path in filter(None, (args.save, args.out)):
+        require_writable(path, "a movie or a page", force=args.force)
     motion = _open(args)
     if args.save is None and args.out is None:
         return _serve(args, motion)
     lines, content = [], {}
     if args.save is not None:
+        args.save.parent.mkdir(parents=True, exist_ok=True)
         frames = _save_movie(args, motion)
         lines.append(f"{args.save}: {frames} frames, {args.save.stat().st_size / 1e6:.1f} MB")
         content["movie"] = str(args.save)
     if args.out is not None:
-        _save_page(args.out, motion)
+        with ProgressBar("clips") as bar:
+            write_output(args.out, write_page(motion, bar), "a page", force=True)
         lines.append(f"{args.out}: {args.out.stat().st_size / 1e6:.1f} MB")
         content["page"] = str(args.out)
     return print_result(args, content, *lines)
@@ -85,14 +87,6 @@ def _save_movie(args: argparse.Namespace, motion: "ViewedMotion") -> int:
     part = MoviePart(shown, args.start, args.end, args.colour_by_error)
     with ProgressBar("frames") as bar:
         return write_movie(motion.skeleton, clip, part, args.save, bar)
-
-
-def _save_page(path: Path, motion: "ViewedMotion") -> None:
-    from harness.core.files import write_text
-    from harness.view import write_page
-
-    with ProgressBar("clips") as bar:
-        write_text(path, write_page(motion, bar))
 
 
 def _serve(args: argparse.Namespace, motion: "ViewedMotion") -> Outcome:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     )
     from harness.compare.rank_correlation import compare_orders, decide_pairs, side_difference, tau_b, tau_interval
     from harness.compare.ranking import ClipValues, MethodRanking, find_best, rank_methods, shared_clips, split_by_lag
+    from harness.compare.side_names import name_sides
+    from harness.compare.sides import ComparisonSet, compare_sides
     from harness.compare.significance import SIGNIFICANCE, Verdict, count_needed, decide_verdicts, holm, sign_flip_p
     from harness.compare.units import BY_NAME, Sampling, average_units, count_clips, count_units
 else:
@@ -33,6 +35,7 @@ __all__ = [
     "TIME_METRICS",
     "ClipValues",
     "Comparison",
+    "ComparisonSet",
     "Difference",
     "MethodRanking",
     "PairedDifference",
@@ -43,6 +46,7 @@ __all__ = [
     "compare_paired",
     "compare_results",
     "compare_runs",
+    "compare_sides",
     "count_clips",
     "count_needed",
     "count_units",
@@ -52,6 +56,7 @@ __all__ = [
     "holm",
     "margin_of",
     "mean_interval",
+    "name_sides",
     "rank_methods",
     "shared_clips",
     "side_difference",

@@ -32,8 +32,15 @@ from harness.core.files import (
 )
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, shorten
-from harness.results import BASELINE_FILES, BASELINES, COUNT_METRICS, SCHEMA, ResultSet, load_results
-from harness.results.files import CELLS_FILE, file_digest, insert_digest, read_summary_json, write_result_json
+from harness.results import BASELINE_FILES, COUNT_METRICS, SCHEMA, ResultSet, load_results
+from harness.results.files import (
+    BASELINES,
+    CELLS_FILE,
+    file_digest,
+    insert_digest,
+    read_summary_json,
+    write_result_json,
+)
 from harness.score import DEFINITIONS
 
 _SUMMARY_KEYS = ("outcome", "cells_finished", "cells_planned", "methods", "groups")

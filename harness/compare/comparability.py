@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 
-from harness.compare.differences import PairGroup
 from harness.compare.matching import RELAXABLE_KEYS, CellPairing, format_cell_name
+from harness.compare.pair_groups import PairGroup
 from harness.core.files import to_json_types
 from harness.errors import UnknownName
 from harness.results import ResultSet, flatten
@@ -18,11 +18,11 @@ _MAX_NAMED = 4
 """Up to this many differing inputs of one group are listed individually."""
 
 
-def check_allowance(allowance: Sequence[str], a: ResultSet, b: ResultSet, differing: Iterable[str]) -> None:
+def check_allowance(allowance: Sequence[str], sides: Iterable[ResultSet], differing: Iterable[str]) -> None:
     """UnknownName for an allowance that names neither an input nor a kind of fault."""
     names = {
         *differing,
-        *(name for side in (a, b) for cell in side.cells[:1] for name in flatten(to_json_types(cell.defined_by))),
+        *(name for side in sides for cell in side.cells[:1] for name in flatten(to_json_types(cell.defined_by))),
     }
     prefixes = {".".join(name.split(".")[:depth]) for name in names for depth in range(1, name.count(".") + 2)}
     for name in allowance:

@@ -15,7 +15,7 @@ from harness.compare.comparability import (
     list_failed_cells,
     summarise_differences,
 )
-from harness.compare.differences import Difference, compare_groups, group_pairs
+from harness.compare.differences import ComparedGroups, Difference, compare_groups
 from harness.compare.margins import GATED_METRICS, INFORMATIVE_METRICS, TIME_METRICS, margin_of
 from harness.compare.matching import (
     RELAXABLE_KEYS,
@@ -25,6 +25,7 @@ from harness.compare.matching import (
     inputs_that_differ,
     pair_cells,
 )
+from harness.compare.pair_groups import group_pairs
 from harness.compare.significance import Verdict
 from harness.compare.units import Sampling
 from harness.core.files import to_json_types
@@ -90,46 +91,91 @@ def compare_results(
     or a gated line is undecided; PASS. Times are gated only where both sides were measured on the same processor.
     UnknownName for metrics, methods and allowances that do not exist; BadInput for duplicate cells.
     """
-    between_methods = methods is not None and len({name.partition("[")[0] for name in methods}) > 1
-    if metrics is None:
-        metrics = [metric for metric in GATED_METRICS if not (between_methods and metric in TIME_METRICS)]
-    metrics = tuple(dict.fromkeys(metrics))
-    for metric in metrics:
+    return compare_with_reference(a, [b], methods=methods, metrics=metrics, allow=allow)[0]
+
+
+def compare_with_reference(
+    reference: ResultSet,
+    others: Sequence[ResultSet],
+    *,
+    methods: Sequence[str] | None = None,
+    metrics: Sequence[str] | None = None,
+    allow: Sequence[str] | None = None,
+) -> tuple[Comparison, ...]:
+    """Compare each of several results with one reference, as `compare_results` does.
+
+    Holm's correction covers the gated lines of all comparisons. `methods` are the method of the reference and those of
+    the others.
+    """
+    for metric in metrics or ():
         margin_of(metric)
-    allowance = tuple(allow or ())
-    matched = pair_cells(a, b, methods, [name for name in allowance if name in RELAXABLE_KEYS])
-    differing = inputs_that_differ(matched.pairs, metrics)
-    check_allowance(allowance, a, b, differing)
-    refused = summarise_differences({name: text for name, text in differing.items() if not is_allowed(allowance, name)})
-    allowed = summarise_differences({name: text for name, text in differing.items() if is_allowed(allowance, name)})
-    groups = [] if refused else group_pairs(matched.pairs)
-    gated = _gated_metrics(metrics, a.manifest, b.manifest)
-    informed = [metric for metric in (*metrics, *GATED_METRICS, *INFORMATIVE_METRICS) if metric not in gated]
-    sampling = _merge_sampling(a.manifest, b.manifest)
-    differences = compare_groups(groups, gated, dict.fromkeys(informed), sampling)
-    faults = {"coverage": find_coverage_faults(groups, metrics), "cells": find_unpaired_cells(matched)}
-    faults_refused = [text for name, texts in faults.items() for text in texts if not is_allowed(allowance, name)]
-    missing = list_failed_cells("A", a, methods and methods[0]) + list_failed_cells("B", b, methods and methods[1])
-    outcome, why = _outcome(matched, refused, differences, missing, faults_refused)
-    return Comparison(
-        a=a.title,
-        b=b.title,
-        differences=differences,
-        matched=len(matched.pairs),
-        only_a=tuple(map(format_cell_name, matched.only_a)),
-        only_b=tuple(map(format_cell_name, matched.only_b)),
-        inputs_that_differ=refused,
-        allowed=(*allowed, *(text for texts in faults.values() for text in texts if text not in faults_refused)),
-        circumstances=_circumstances(a.manifest, b.manifest),
-        outcome=outcome,
-        why=why,
-        coverage=tuple(faults["coverage"]),
-        failed=missing,
-        training_notes=(
-            *_training_notes("A", a.manifest, [one.method for one, _ in matched.pairs]),
-            *_training_notes("B", b.manifest, [other.method for _, other in matched.pairs]),
-        ),
-    )
+    pairs = [
+        _PairedResults(reference, other, (methods[0], method) if methods and method else None, metrics, allow or ())
+        for other, method in zip(others, methods[1:] if methods else [""] * len(others), strict=True)
+    ]
+    check_allowance(allow or (), (reference, *others), {name for pair in pairs for name in pair.differing})
+    lines = compare_groups([pair.compared for pair in pairs])
+    return tuple(pair.conclude(differences) for pair, differences in zip(pairs, lines, strict=True))
+
+
+class _PairedResults:
+    """The paired cells of B and the reference A, and what prevents their comparison."""
+
+    def __init__(
+        self,
+        a: ResultSet,
+        b: ResultSet,
+        methods: tuple[str, str] | None,
+        metrics: Sequence[str] | None,
+        allow: Sequence[str],
+    ) -> None:
+        self.a, self.b, self.methods, self.allow = a, b, methods, allow
+        between_methods = methods is not None and len({name.partition("[")[0] for name in methods}) > 1
+        if metrics is None:
+            metrics = [metric for metric in GATED_METRICS if not (between_methods and metric in TIME_METRICS)]
+        metrics = tuple(dict.fromkeys(metrics))
+        self.matched = pair_cells(a, b, methods, [name for name in allow if name in RELAXABLE_KEYS])
+        self.differing = inputs_that_differ(self.matched.pairs, metrics)
+        self.refused = self._summary(allowed=False)
+        groups = [] if self.refused else group_pairs(self.matched.pairs)
+        gated = _gated_metrics(metrics, a.manifest, b.manifest)
+        informed = [metric for metric in (*metrics, *GATED_METRICS, *INFORMATIVE_METRICS) if metric not in gated]
+        self.compared = ComparedGroups(groups, gated, dict.fromkeys(informed), merge_sampling(a.manifest, b.manifest))
+        self.faults = {"coverage": find_coverage_faults(groups, metrics), "cells": find_unpaired_cells(self.matched)}
+
+    def _summary(self, *, allowed: bool) -> tuple[str, ...]:
+        chosen = {name: text for name, text in self.differing.items() if is_allowed(self.allow, name) == allowed}
+        return summarise_differences(chosen)
+
+    def conclude(self, differences: tuple[Difference, ...]) -> Comparison:
+        """The comparison with these lines."""
+        a, b, matched, methods = self.a, self.b, self.matched, self.methods
+        faults = [text for name, texts in self.faults.items() for text in texts if not is_allowed(self.allow, name)]
+        faults_allowed = [text for texts in self.faults.values() for text in texts if text not in faults]
+        failed = list_failed_cells("A", a, methods and methods[0]) + list_failed_cells("B", b, methods and methods[1])
+        outcome, why = _outcome(matched, self.refused, differences, failed, faults)
+        titles = a.title, b.title
+        if methods and a.title == b.title and methods[0] != methods[1]:
+            titles = f"{methods[0]} of {a.title}", f"{methods[1]} of {b.title}"
+        return Comparison(
+            a=titles[0],
+            b=titles[1],
+            differences=differences,
+            matched=len(matched.pairs),
+            only_a=tuple(map(format_cell_name, matched.only_a)),
+            only_b=tuple(map(format_cell_name, matched.only_b)),
+            inputs_that_differ=self.refused,
+            allowed=(*self._summary(allowed=True), *faults_allowed),
+            circumstances=_circumstances(a.manifest, b.manifest),
+            outcome=outcome,
+            why=why,
+            coverage=tuple(self.faults["coverage"]),
+            failed=failed,
+            training_notes=(
+                *_training_notes("A", a.manifest, [one.method for one, _ in matched.pairs]),
+                *_training_notes("B", b.manifest, [other.method for _, other in matched.pairs]),
+            ),
+        )
 
 
 def compare_runs(
@@ -149,7 +195,7 @@ def compare_runs(
     return compare_results(reference, other, methods=methods, metrics=metrics, allow=allow)
 
 
-def _merge_sampling(a: Manifest, b: Manifest) -> Sampling:
+def merge_sampling(a: Manifest, b: Manifest) -> Sampling:
     """The performers that either side knows, or by name where neither stored any; clips are units if both say so."""
     sides = [side.performers for side in (a, b) if side.performers is not None]
     known = {clip: who for side in sides for clip, who in side.items()} if sides else None

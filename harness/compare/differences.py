@@ -3,13 +3,13 @@
 A line pools behaviours, and known and new performers. Its parts show them one by one.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from harness.compare.margins import margin_of
-from harness.compare.matching import CellPair
+from harness.compare.pair_groups import PairGroup
 from harness.compare.significance import SignificanceResult, Verdict, decide_verdicts
 from harness.compare.units import BY_NAME, Sampling, average_units
 from harness.core.arrays import Floats
@@ -59,67 +59,46 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class PairGroup:
-    """Pairs of cells that are pooled."""
+class ComparedGroups:
+    """What is compared of two results."""
 
-    method: str
-    text: str
-    """Inputs and split, which all pairs share."""
-    pairs: tuple[CellPair, ...]
-    part: str = ""
-
-    @property
-    def title(self) -> str:
-        return f"{self.method} ({self.text})"
-
-    @property
-    def parts(self) -> "list[PairGroup]":
-        """The pairs of each behaviour and of known and new performers; of neither where all pairs have the same."""
-        behaviours, performers = dict[str, list[CellPair]](), dict[str, list[CellPair]]()
-        for a, b in self.pairs:
-            behaviours.setdefault(a.behaviour, []).append((a, b))
-            performers.setdefault(f"{a.performer or b.performer} performers", []).append((a, b))
-        return [
-            replace(self, pairs=tuple(pairs), part=name)
-            for by_name in (behaviours, performers)
-            for name, pairs in by_name.items()
-            if len(by_name) > 1
-        ]
+    groups: Sequence[PairGroup]
+    gated: Sequence[str]
+    """Metrics of the gated lines."""
+    informed: Iterable[str] = ()
+    """Metrics that are shown for information."""
+    sampling: Sampling = BY_NAME
 
 
-def group_pairs(pairs: Iterable[CellPair]) -> list[PairGroup]:
-    """Group pairs by method, inputs and split, in the order of the pairs."""
-    groups: dict[tuple[str, str], list[CellPair]] = {}
-    for a, b in pairs:
-        method = a.method if a.method == b.method else f"{a.method} vs {b.method}"
-        split = b.split if a.split == "none" else a.split
-        text = ", ".join(filter(None, (a.inputs, split)))
-        groups.setdefault((method, text), []).append((a, b))
-    return [PairGroup(*name, tuple(members)) for name, members in groups.items()]
+def compare_groups(comparisons: Sequence[ComparedGroups]) -> list[tuple[Difference, ...]]:
+    """For each comparison, compare every metric of every group that both sides measured on some clip.
 
-
-def compare_groups(
-    groups: Sequence[PairGroup],
-    gated: Sequence[str],
-    informed: Iterable[str] = (),
-    sampling: Sampling = BY_NAME,
-) -> tuple[Difference, ...]:
-    """Compare every metric of every group that both sides measured on some clip.
-
-    Gated lines come first and are tested together. The lines in `informed` are tested individually, and the parts of a
-    gated line together.
+    Gated lines come first; those of all comparisons are tested together. The `informed` lines are tested individually,
+    and the parts of a gated line together.
     """
-    first = [sides for group in groups for metric in gated if (sides := _sides(group, metric, sampling)).clips]
-    others = [sides for group in groups for metric in informed if (sides := _sides(group, metric, sampling)).clips]
-    families = [first, *([sides] for sides in others)]
-    for sides in first:
-        parts = [_sides(part, sides.metric, sampling) for part in sides.group.parts]
-        families.append([part for part in parts if part.clips])
-    lines = []
-    for number, family in enumerate(families):
-        results = decide_verdicts([sides.worsening for sides in family], [sides.margin for sides in family])
-        lines += [_difference(*line, gated=number == 0) for line in zip(family, results, strict=True)]
-    return tuple(lines)
+    gated = [[*_measured(each, each.gated)] for each in comparisons]
+    results = iter(_decide([sides for lines in gated for sides in lines]))
+    found = []
+    for each, lines in zip(comparisons, gated, strict=True):
+        differences = [_difference(sides, next(results), gated=True) for sides in lines]
+        families = [[sides] for sides in _measured(each, each.informed)]
+        for line in lines:
+            parts = [_sides(part, line.metric, each.sampling) for part in line.group.parts]
+            families.append([part for part in parts if part.clips])
+        for family in families:
+            differences += [_difference(*line, gated=False) for line in zip(family, _decide(family), strict=True)]
+        found.append(tuple(differences))
+    return found
+
+
+def _measured(compared: ComparedGroups, metrics: Iterable[str]) -> Iterator["_Sides"]:
+    names = tuple(metrics)
+    lines = (_sides(group, metric, compared.sampling) for group in compared.groups for metric in names)
+    return (sides for sides in lines if sides.clips)
+
+
+def _decide(family: Sequence["_Sides"]) -> list[SignificanceResult]:
+    return decide_verdicts([sides.worsening for sides in family], [sides.margin for sides in family])
 
 
 @dataclass(frozen=True, eq=False)

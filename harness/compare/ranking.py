@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.compare.margins import GATED_METRICS, TIME_METRICS, margin_of
-from harness.compare.paired_statistics import MIN_UNITS
+from harness.compare.paired_statistics import MIN_UNITS, mean_interval
 from harness.compare.significance import SIGNIFICANCE, SignificanceResult, decide_verdicts, sign_flip_p
 from harness.compare.units import BY_NAME, Sampling, average_units
 from harness.core.arrays import Floats
@@ -38,6 +38,10 @@ class MethodRanking:
     """Other method -> verdict on the first one against it, over the units on which both were measured."""
     differences: Mapping[str, float]
     """Other method -> its mean minus that of the first one, over the units on which both were measured."""
+    simultaneous: Mapping[str, tuple[float, float]]
+    """Other method -> 95 % interval of that difference, corrected by Bonferroni for all lines that are tested together.
+
+    An interval of one comparison may exclude zero beside a verdict that is corrected for many."""
 
     @property
     def lowest(self) -> str:
@@ -90,9 +94,16 @@ def rank_methods(values: Mapping[str, ClipValues], metric: str, sampling: Sampli
     lines = [_paired(measured[name], measured[lowest], each, sampling) for name, each in pairs]
     kept = [(line, margin) for line, margin in lines if len(line)]
     results = decide_verdicts([line for line, _ in kept], [margin for _, margin in kept], range(len(others)))
+    lines_tested = sum(len(line) >= MIN_UNITS and bool(np.any(line)) for line, _ in kept)
+    intervals = {
+        name: mean_interval(-line, 1.0 - SIGNIFICANCE / max(lines_tested, 1))
+        for name, (line, _) in zip(others, kept, strict=False)
+        if len(line) >= MIN_UNITS
+    }
     ordered = {name: columns[name] for name in (lowest, *others)}
     differences = {name: -float(line.mean()) for name, (line, _) in zip(others, kept, strict=False)}
-    return MethodRanking(metric, clips, units, ordered, dict(zip(others, results, strict=True)), differences)
+    verdicts = dict(zip(others, results, strict=True))
+    return MethodRanking(metric, clips, units, ordered, verdicts, differences, intervals)
 
 
 def find_best(values: Mapping[str, ClipValues], metric: str, sampling: Sampling = BY_NAME) -> str | None:

@@ -1,6 +1,7 @@
 """Frozen dataclasses built from mappings, such as TOML tables, and checked against their annotations."""
 
 import dataclasses
+import json
 import math
 import types
 from collections.abc import Iterable, Iterator, Mapping
@@ -26,7 +27,7 @@ def build(kind: type[T], content: Any, where: str) -> T:
     (`core.ranges`).
     """
     if not isinstance(content, Mapping):
-        raise TypeError(f"{where}: expected a table, found {shorten(repr(content), 60)}")
+        raise _wrong_type(dict, content, where)
     stored: Mapping[str, str] = getattr(kind, "STORED_NAMES", {})
     content = {stored.get(key, key): value for key, value in content.items()}
     hints = get_type_hints(kind, include_extras=True)
@@ -105,7 +106,7 @@ def convert(hint: Any, value: Any, where: str) -> Any:
         return value
     if origin is tuple:
         if not isinstance(value, list):
-            raise TypeError(f"{where}: expected a list, found {shorten(repr(value), 60)}")
+            raise _wrong_type(hint, value, where)
         if args[-1] is not Ellipsis and len(args) != len(value):
             raise TypeError(f"{where}: expected {len(args)} values, found {len(value)}")
         kinds = [args[0]] * len(value) if args[-1] is Ellipsis else args
@@ -113,7 +114,7 @@ def convert(hint: Any, value: Any, where: str) -> Any:
         return tuple(convert(kind, item, f"{where}[{i}]") for i, (kind, item) in pairs)
     if origin is dict:
         if not isinstance(value, Mapping):
-            raise TypeError(f"{where}: expected a table, found {shorten(repr(value), 60)}")
+            raise _wrong_type(hint, value, where)
         return {
             convert(args[0], str(key), where): convert(args[1], item, f"{where}.{shorten(key, 60)}")
             for key, item in value.items()
@@ -123,7 +124,7 @@ def convert(hint: Any, value: Any, where: str) -> Any:
     if hint is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     if not isinstance(value, hint) or (isinstance(value, bool) and hint is not bool):
-        raise TypeError(f"{where}: expected {hint.__name__}, found {shorten(repr(value), 60)}")
+        raise _wrong_type(hint, value, where)
     if isinstance(value, float) and not math.isfinite(value):
         raise TypeError(f"{where}: expected a finite number, found {value}")
     return value
@@ -148,11 +149,41 @@ def check_entries(content: Any, hints: Mapping[str, Any], where: str) -> None:
     UnknownName for a value that is none of the choices.
     """
     if not isinstance(content, Mapping):
-        raise TypeError(f"{where}: expected a table, found {content!r}")
+        raise _wrong_type(dict, content, where)
     for name, hint in hints.items():
         if name not in content:
             raise TypeError(f"{where}: no {name}")
         convert(hint, content[name], f"{where}.{name}")
+
+
+def _wrong_type(hint: Any, found: Any, where: str) -> TypeError:
+    """The error "scenario.methods: expected a list of texts, such as ["ik"], found 'ik'"."""
+    kind, _, example = _describe_type(hint, found)
+    such = f", such as {example}" if example else ""
+    return TypeError(f"{where}: expected {kind}{such}, found {shorten(repr(found), 60)}")
+
+
+_SCALARS = {
+    bool: ("true or false", "booleans", ""),
+    int: ("a whole number", "whole numbers", "3"),
+    float: ("a number", "numbers", "0.5"),
+    str: ("a text", "texts", '"walking"'),
+}
+
+
+def _describe_type(hint: Any, found: Any) -> tuple[str, str, str]:
+    """What values an annotation allows, in the singular and in the plural, and an example made of what was found."""
+    origin, args = get_origin(hint), [arg for arg in get_args(hint) if arg is not type(None)]
+    if origin in (Annotated, Union, types.UnionType):
+        return _describe_type(args[0], found)
+    if origin is tuple:
+        _, kinds, example = _describe_type(args[0], found)
+        number = 1 if args[-1] is Ellipsis else len(args)
+        text = f"of {kinds if args[-1] is Ellipsis else f'{number} {kinds}'}"
+        return f"a list {text}", f"lists {text}", f"[{', '.join([example] * number)}]"
+    if type(found) is hint:
+        return *_SCALARS[hint][:2], json.dumps(found, ensure_ascii=False)
+    return _SCALARS.get(hint, ("a table", "tables", ""))
 
 
 def _convert_union(kinds: tuple[Any, ...], value: Any, where: str) -> Any:

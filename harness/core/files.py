@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from harness.core import parsing
 from harness.core.fault_report import is_system_fault
 from harness.core.input_file import MEGABYTE, read_input_file
+from harness.core.output_place import place_fault
 from harness.errors import BadFile
 
 TEMPORARY = ".unfinished-"
@@ -243,16 +244,17 @@ def require_writable(path: Path, what: str, *, force: bool) -> None:
         raise BadFile(path, "it is not a file", f"a file name for {what}", "Choose another.")
     if path.exists() and not force:
         raise BadFile(path, "it exists", "a new file", "Choose another name, or overwrite it with --force.")
-    if not path.absolute().parent.is_dir():
-        raise BadFile(path, "the folder does not exist", f"a file name for {what}", "Create it, or choose another.")
+    if fault := place_fault(path.absolute().parent):
+        raise BadFile(path, fault, f"a file name for {what}", "Choose another.")
 
 
-def write_output(path: Path, text: str, what: str, *, force: bool) -> None:
-    """Write a text in UTF-8 atomically; BadFile as `require_writable`, and where the system refuses the file."""
+def write_output(path: Path, content: str | bytes, what: str, *, force: bool) -> None:
+    """Write a file atomically, a text in UTF-8, and make its folder; BadFile as `require_writable`."""
     require_writable(path, what, force=force)
     target = path.resolve()  # a symbolic link stays; its target is replaced
     try:
-        write_bytes(target, text.encode("utf-8", errors="replace"))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(target, content if isinstance(content, bytes) else content.encode("utf-8", errors="replace"))
     except OSError as error:
         if is_system_fault(error):
             raise

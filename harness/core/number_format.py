@@ -178,7 +178,10 @@ class Interval:
             return ""
         if self.low == self.high and not self.signed:
             return "exact"
-        return f"{self._write(self.low)} to {self._write(self.high)}"
+        low, high = self._write(self.low), self._write(self.high)
+        if low == high and self.low < self.high:  # the width is below the digits of the value
+            return f"± {0.5 * (self.high - self.low):.1g}"
+        return f"{low} to {high}"
 
     def __str__(self) -> str:
         return f"{self.number} ({self.ends})" if self.has_interval else self.number

@@ -95,7 +95,8 @@ class Range:
     def __str__(self) -> str:
         """The range in words, such as "a number from 0 to 1"."""
         kind = "two ascending numbers" if self.ascending else "a number"
-        return f"{kind} from {self.low:g}" + (f" to {self.high:g}" if math.isfinite(self.high) else "")
+        high = f"{self.high:,}" if isinstance(self.high, int) else f"{self.high:g}"
+        return f"{kind} from {self.low:g}" + (f" to {high}" if math.isfinite(self.high) else "")
 
 
 Constraint = Range | Label

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
-    from harness.experiment.calibration_session import CalibrationOutcome, CalibrationSession
+    from harness.experiment.calibration_session import CalibrationSession
     from harness.experiment.cells import clear_caches, evaluate_cell
     from harness.experiment.clip_evaluation import ClipEvaluation
     from harness.experiment.clip_simulation import simulate_clip
@@ -31,7 +31,6 @@ else:
 
 __all__ = [
     "BatchResults",
-    "CalibrationOutcome",
     "CalibrationSession",
     "ClipEvaluation",
     "ClipTask",

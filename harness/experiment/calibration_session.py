@@ -11,6 +11,7 @@ from harness.body import Body, Mount, build_body
 from harness.calibrate import (
     POSES,
     CalibrationFile,
+    CalibrationOutcome,
     CalibrationPose,
     Notifier,
     PerformerPreview,
@@ -28,6 +29,7 @@ from harness.calibrate import (
 )
 from harness.core.arrays import Floats
 from harness.core.package_data import VERSION
+from harness.core.skeleton import Skeleton
 from harness.core.split import ClipPart
 from harness.experiment.playback import prepare_playback, select_stations
 from harness.experiment.scenarios.motion_source import expand_clips, open_scenario_motion
@@ -37,14 +39,6 @@ from harness.mocap import LibraryFolders, MotionSource
 from harness.stream import TrackerFrame
 
 CalibrationKind = Literal["poses", "tpose"]
-
-
-@dataclass(frozen=True, eq=False)
-class CalibrationOutcome:
-    """A calibration and its report."""
-
-    file: CalibrationFile
-    lines: list[str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +57,8 @@ class CalibrationSession:
     """
     folder: LibraryFolders | None = None
     """Library of real motion, if the scenario needs one."""
+    skeleton: Skeleton | None = None
+    """The performer's skeleton for `tpose`, where it is not that of the clip."""
 
     @cached_property
     def resolved_scenario(self) -> Scenario:
@@ -85,6 +81,8 @@ class CalibrationSession:
         """The performer's body for `tpose`, the standard body for `poses`."""
         if self.kind == "poses":
             return build_body()
+        if self.skeleton is not None:
+            return build_body(self.skeleton)
         return prepare_playback(self.scenario, clip=self.clip, folder=self.folder).body
 
     @cached_property

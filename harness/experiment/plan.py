@@ -3,7 +3,6 @@
 Names that do not exist are refused here, before anything is written and hours of work begin.
 """
 
-import difflib
 import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from harness.core.split import ClipPart
-from harness.errors import BadInput
+from harness.errors import BadInput, suggest
 from harness.experiment.methods.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.methods.method_table import MethodTable, find_methods
 from harness.experiment.scenarios.motion_source import expand_clips, open_scenario_motion
@@ -59,9 +58,10 @@ class RunPlan:
         for task in (single for whole in self.cells.tasks for single in split_task(whole)):
             if str(task.cells()[0]) == cell:
                 return replace(self, cells=CellPlan((cell,), (task,), self.cells.sources))
-        near = difflib.get_close_matches(cell, self.names, n=1)
-        hint = f" Did you mean {near[0]!r}?" if near else ""
-        raise BadInput(f"No cell is called {cell!r}.{hint}", f"`harness status {out}` names those that failed.")
+        raise BadInput(
+            f"No cell is called {cell!r}.{suggest(cell, self.names)}",
+            f"`harness status {out}` names those that failed.",
+        )
 
 
 @dataclass(frozen=True)

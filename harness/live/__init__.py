@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from harness.live.pose_terminal import PoseTerminal
     from harness.live.scheduling_jitter import JitterProbe
     from harness.live.session import LiveOptions, LiveResult, run_session, warm_up
+    from harness.live.session_control import SessionControl
     from harness.live.viewer import ViewerOutput
     from harness.live.vmc import VmcOutput
 else:
@@ -22,6 +23,7 @@ __all__ = [
     "LiveResult",
     "OutputOptions",
     "PoseTerminal",
+    "SessionControl",
     "SessionSetup",
     "ViewerOutput",
     "VmcOutput",

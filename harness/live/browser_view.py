@@ -1,42 +1,49 @@
 """The output `live --view browser`: a page on loopback that shows the body, the stations and the line.
 
-The session writes each frame to shared memory and waits for nobody. A process of its own serves the page.
+The session writes each frame to shared memory and waits for nobody. A process of its own serves the page. What the
+page commands is carried out by a thread here, and by the session's solving thread.
 """
 
+import html
 import os
-import time
+import tempfile
+import webbrowser
 from contextlib import suppress
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
+import numpy as np
+
 from harness.core.child_process import SPAWN, FunctionProcess
 from harness.core.interrupts import shield_children
-from harness.errors import BadFile, BadInput, HarnessError
+from harness.errors import BadInput, HarnessError
 from harness.live.pose import LivePose, SessionSetup
+from harness.live.session_control import SessionControl
 from harness.live.shared_memory import PoseRing, first_message
-from harness.stream.recording import RecordingSwitch
 
 _END_TIMEOUT_S = 2.0
+_STATE_PERIOD_S = 0.5
+"""Time after which the page learns that a recording has failed."""
 
 
 class BrowserOutput:
-    """An `Output` that shows poses on a page, from which a recording can be started and stopped."""
+    """An `Output` that shows poses on a page, from which the session can be commanded."""
 
     name = "--view browser"
 
-    def __init__(self, setup: SessionSetup, recorder: RecordingSwitch, folder: Path) -> None:
+    def __init__(self, setup: SessionSetup, control: SessionControl, folder: Path) -> None:
         """Start the process and wait until it serves the page.
 
-        `recorder` records into new files of `folder`. BadFile when that is no folder, BadInput when the page cannot be
-        served.
+        Recordings and calibrations that the page starts become new files of `folder`, which is made.
+        BadInput when the page cannot be served.
         """
-        if not folder.is_dir():
-            raise BadFile(folder, "no folder", "a folder for recordings", "Name another with --out.")
-        self._recorder, self._folder = recorder, folder
+        folder.mkdir(parents=True, exist_ok=True)
+        self._control, self._folder = control, folder
+        self._start_page: Path | None = None
         with shield_children():  # a signal ends the session, and the session ends the viewer
             self._ring = PoseRing(SPAWN, len(setup.stations))
-            self._process = FunctionProcess(_run_process, setup, self._ring)
+            self._process = FunctionProcess(_run_process, setup, self._ring, str(folder))
         try:
             message = first_message(self._process)
             if isinstance(message, OSError):
@@ -45,9 +52,23 @@ class BrowserOutput:
             self.close()
             raise
         self.url = str(message)
-        self.description = f"view: {self.url}"
-        self._thread = Thread(target=self._carry_out, name="page commands", daemon=True)
+        """Address of the page, with the token that its commands need."""
+        self.description = f"view: {self.url}\n  Whoever opens it without the part from # on can look, and not command."
+        self._thread = Thread(target=self._follow_page, name="page commands", daemon=True)
         self._thread.start()
+
+    def open_browser(self) -> bool:
+        """Open the page in the browser; False when there is none.
+
+        The browser opens a file that only this user can read, which leads to the address: the command lines of
+        programs are visible to all users of a computer.
+        """
+        text = f'<!doctype html><meta http-equiv="refresh" content="0;url={html.escape(self.url)}">\n'
+        handle, name = tempfile.mkstemp(prefix="harness_live_", suffix=".html")  # mode 0600
+        self._start_page = Path(name)
+        with open(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        return webbrowser.open(self._start_page.as_uri())
 
     def send(self, pose: LivePose) -> None:
         """Show a pose; OSError when the viewer's process has ended."""
@@ -55,40 +76,52 @@ class BrowserOutput:
             raise OSError("its process ended")
         self._ring.put(pose)
 
-    def _carry_out(self) -> None:
-        """Start and stop recordings as the page asks, until the pipe closes."""
+    def _follow_page(self) -> None:
+        """Carry out the commands of the page, and tell it of the recording, until the pipe closes."""
+        shown, recorder = dict[str, str](), self._control.recorder
         try:
             while True:
-                self._process.pipe.send({"answer": True, **self._record(self._process.receive())})
+                with suppress(TimeoutError):
+                    answer = self._carry_out(*self._process.receive(_STATE_PERIOD_S))
+                    self._process.pipe.send(("answer", answer))
+                path = recorder.path
+                state = {"recording": "" if path is None else path.name, "failure": recorder.failure}
+                if state != shown:
+                    shown = state
+                    self._process.pipe.send(("recording", state))
         except (EOFError, OSError):
             return
 
-    def _record(self, on: bool) -> dict[str, Any]:
-        answer: dict[str, Any] = {}
+    def _carry_out(self, command: str, content: Any) -> dict[str, Any]:
+        control = self._control
         try:
-            if on:
-                self._recorder.start(self._folder / time.strftime("live_%Y%m%d_%H%M%S.rec"))
-            else:
-                answer["saved"] = str(self._recorder.stop())
+            if command == "heading":
+                return {"turn_deg": round(float(np.rad2deg(control.reset_heading())), 1)}
+            if command == "calibration":
+                control.use_calibration(content)
+                return {}
+            if content:
+                return {"recording": control.start_recording(self._folder).name}
+            return {"recording": "", "saved": str(control.recorder.stop())}
         except HarnessError as error:
-            answer["error"] = self._recorder.failure or str(error)
-        path = self._recorder.path
-        return answer | {"recording": "" if path is None else str(path)}
+            return {"error": control.recorder.failure or str(error)}
 
     def close(self) -> None:
         """End the page and the recording."""
-        self._recorder.close()
+        self._control.recorder.close()
         self._process.close(_END_TIMEOUT_S)
+        if self._start_page is not None:
+            self._start_page.unlink(missing_ok=True)
 
 
-def _run_process(pipe: Any, setup: SessionSetup, ring: PoseRing) -> None:
+def _run_process(pipe: Any, setup: SessionSetup, ring: PoseRing, folder: str) -> None:
     """Entry point of the viewer's process, which runs at low priority. It reports its errors through the pipe."""
     if hasattr(os, "nice"):
         os.nice(10)
     try:
         from harness.live.browser_process import run_browser
 
-        run_browser(setup, ring, pipe)
+        run_browser(setup, ring, folder, pipe)
     except OSError as error:
         with suppress(OSError):  # the session has been killed
             pipe.send(OSError(str(error)))

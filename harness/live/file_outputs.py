@@ -15,6 +15,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.csv_text import csv_line
 from harness.core.fault_report import is_system_fault
+from harness.core.files import require_writable
 from harness.core.skeleton import Skeleton
 from harness.errors import BadFile
 from harness.live.pose import LivePose
@@ -28,15 +29,12 @@ class IncrementalFile:
 
     def __init__(self, path: Path, head: bytes, *, force: bool) -> None:
         """BadFile if the file exists and `force` is not set, or if it cannot be written."""
-        if force and path.exists() and not path.is_file():
-            raise BadFile(path, "it is not a regular file", "a file to replace", "Name another.")
+        require_writable(path, "a file of motion", force=force)
         self.path = path.resolve() if force else path  # the target of a link is replaced, not the link
         self._written_path = self.path.with_name(f".unfinished-{self.path.name}") if force else path
         try:
+            path.parent.mkdir(parents=True, exist_ok=True)
             self._file: FileIO = self._written_path.open("wb" if force else "xb", buffering=0)
-        except FileExistsError as error:
-            advice = "Name another, or replace it with --force."
-            raise BadFile(path, "it exists", "no such file yet", advice) from error
         except OSError as error:
             if is_system_fault(error):
                 raise

@@ -20,6 +20,14 @@ SECONDS_KEPT = 60
 """Number of summaries that are kept."""
 
 
+_STATUS_WORDS = {
+    Status.SOLVED: ("OK", ""),
+    Status.HELD: ("HELD", "too few readings: the pose is extrapolated"),
+    Status.LOST: ("LOST", "fewer than half of the stations have readings"),
+}
+"""Word of the status of a pose, and what it means."""
+
+
 @dataclass(frozen=True)
 class SecondSummary:
     """What happened in about one second of a session."""
@@ -67,6 +75,11 @@ class LiveStatistics:
         self._seen_s: Floats = np.full(len(stations), self._began_s)
         """Time of the last valid reading of each station [s]."""
         self._missing: Bools = np.zeros(len(stations), dtype=bool)
+        self._delivered: Bools = np.zeros((2, len(stations)), dtype=bool)
+        """Whether each station has ever had a valid position, and orientation."""
+        self._whole: Bools = np.zeros(len(stations), dtype=bool)
+        """Whether the newest frame has all that each station delivers."""
+        self._status = Status.LOST
         self._summaries: deque[SecondSummary] = deque(maxlen=SECONDS_KEPT)
         self._second = _Second(len(stations))
         self._dropped = 0
@@ -78,8 +91,11 @@ class LiveStatistics:
             if not self._began:
                 self._began, self._began_s, self._second_s = True, now_s, now_s
                 self._seen_s[:] = now_s
-            self._frame_s = now_s
+            self._frame_s, self._status = now_s, status
             self._seen_s[valid] = now_s
+            present = np.array([frame.position_valid, frame.orientation_valid])
+            self._delivered |= present
+            self._whole = valid & (present | ~self._delivered).all(axis=0)
             self._second.add(frame, status, latency_s)
 
     def update(self, dropped: int = 0) -> list[str]:
@@ -118,14 +134,24 @@ class LiveStatistics:
         return self.silent_s() > LOST_AFTER_S
 
     def page_content(self) -> dict[str, Any]:
-        """What the live page shows: the summaries, which stations are lost, and for how long no frame came [s]."""
-        silent = self.is_silent
-        return {
-            "seconds": [one.page_content() for one in self._summaries],
-            "lost": [silent or gone for gone in self._missing.tolist()],
-            "silent": silent,
-            "silent_s": round(self.silent_s(), 1),
-        }
+        """What the live page shows: the summaries, and of the session and each station OK, HELD or LOST.
+
+        A session is what its newest pose is, and LOST while no frame comes for `LOST_AFTER_S`. A station is OK when the
+        newest frame has all that it delivers, LOST without any valid reading for `LOST_AFTER_S`, and HELD in between.
+        """
+        silent, whole = self.is_silent, self._whole.tolist()
+        gone = [silent or missing for missing in self._missing.tolist()]
+        stations = ["LOST" if lost else "OK" if here else "HELD" for lost, here in zip(gone, whole, strict=True)]
+        missing = [name for name, lost in zip(self.stations, gone, strict=True) if lost]
+        word, why = _STATUS_WORDS[self._status]
+        if not self._began:
+            word, why = "LOST", "no pose yet"
+        elif silent:
+            word, why = "LOST", f"no data for {format_fixed(self.silent_s(), 1)} s"
+        elif missing:
+            why = f"{why}{'; ' if why else ''}no reading of {', '.join(missing)}"
+        seconds = [one.page_content() for one in self._summaries]
+        return {"seconds": seconds, "silent": silent, "session": word, "why": why, "stations": stations}
 
     def status_line(self) -> str:
         """The last second in one line; "" before the first second is over."""

@@ -1,6 +1,5 @@
 """The outputs that a user asks for, opened one after another."""
 
-import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -13,9 +12,9 @@ from harness.live.browser_view import BrowserOutput
 from harness.live.file_outputs import BvhOutput, PoseTableOutput
 from harness.live.lsl import LslOutput
 from harness.live.pose import Output, SessionSetup
+from harness.live.session_control import SessionControl
 from harness.live.viewer import ViewerOutput
 from harness.live.vmc import VmcOutput
-from harness.stream.recording import RecordingSwitch
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ class OutputOptions:
     no_browser: bool = False
     """Whether the page of the view "browser" is served, but not opened."""
     out: Path | None = None
-    """Folder of the pictures of the view "frames", and of recordings that the view "browser" starts."""
+    """Folder of the pictures of the view "frames", and of recordings and calibrations from the view "browser"."""
     force: bool = False
     """Whether files that exist are replaced."""
 
@@ -51,16 +50,16 @@ class OutputOptions:
 def open_outputs(
     options: OutputOptions,
     setup: SessionSetup,
-    recorder: RecordingSwitch,
+    control: SessionControl,
     opened: ExitStack,
     say: Callable[[str], None] = lambda text: None,
 ) -> list[Output]:
     """Open the requested outputs; `opened` closes them again, also when a later one is refused.
 
-    `say` receives a line on each of them. `recorder` is that of the recordings that the view "browser" starts.
+    `say` receives a line on each of them. `control` is what the page of the view "browser" commands.
     """
     outputs: list[Output] = []
-    waiting = _requested_outputs(options, setup, recorder, say)
+    waiting = _requested_outputs(options, setup, control, say)
     while True:
         with defer_interrupts():
             output = next(waiting, None)
@@ -72,7 +71,7 @@ def open_outputs(
 
 
 def _requested_outputs(
-    options: OutputOptions, setup: SessionSetup, recorder: RecordingSwitch, say: Callable[[str], None]
+    options: OutputOptions, setup: SessionSetup, control: SessionControl, say: Callable[[str], None]
 ) -> Iterator[Output]:
     """Open each output when it is asked for."""
     if options.vmc is not None:
@@ -84,8 +83,8 @@ def _requested_outputs(
     if options.poses is not None:
         yield PoseTableOutput(options.poses, setup.skeleton, setup.stations, force=options.force)
     if options.view == "browser":
-        page = BrowserOutput(setup, recorder, options.out or Path())
-        if not options.no_browser and not webbrowser.open(page.url):
+        page = BrowserOutput(setup, control, options.out or Path())
+        if not options.no_browser and not page.open_browser():
             say("No browser was found: open the address in one.")
         yield page
     elif options.view is not None:

@@ -1,17 +1,41 @@
 """The input of outputs: what a session is of, and each estimate with its posed body and its times."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from harness.body import Body, Kinematics
+from harness.calibrate import CalibrationOutcome, CalibrationPose, Notifier, PoseCollector, PoseDisplay
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.estimate import Estimate
 from harness.core.skeleton import Skeleton
 from harness.stream import TrackerFrame
+
+
+class GuidedCalibration(Protocol):
+    """A calibration of the performer by held poses, as `experiment.CalibrationSession` is one. It can be pickled."""
+
+    @property
+    def poses(self) -> tuple[CalibrationPose, ...]: ...
+
+    @property
+    def body(self) -> Body:
+        """The body that shows the poses."""
+        ...
+
+    def collect_poses(
+        self, frames: Iterable[TrackerFrame], say: Notifier, displays: Sequence[PoseDisplay] = ()
+    ) -> PoseCollector:
+        """Guide the performer through the poses; UnusableHold when the frames end before the last pose."""
+        ...
+
+    def solve(self, held: Sequence[Sequence[TrackerFrame]], source: str) -> CalibrationOutcome:
+        """Solve for the calibration. UnusableHold, BadInput."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,9 +46,9 @@ class SessionSetup:
     stations: tuple[str, ...]
     rate_hz: float
     """Expected frame rate of the tracker [Hz]."""
-    room: tuple[Floats, Floats] | None
-    """`world_from_tracker` (4,) and the tracker's origin in the world (3,) [m]; None if they are not known."""
     title: str
+    calibrations: Mapping[str, GuidedCalibration] = field(default_factory=dict)
+    """Calibrations by poses that the page of the session offers, by kind."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +69,8 @@ class LivePose:
     estimate: Estimate
     kinematics: Kinematics
     """Shared by all poses of a session and set to this pose on first use; for one thread only."""
+    room: tuple[Floats, Floats] | None = None
+    """The tracker's origin in the world (3,) [m], and `world_from_tracker` (4,); None if they are not known."""
 
     @cached_property
     def bones(self) -> tuple[Floats, Floats]:

@@ -86,7 +86,7 @@ class SharedPose:
             return np.array(self._memory)
 
 
-_HEAD, _QPOS, _STATION = 4, 55, 10
+_HEAD, _QPOS, _ROOM, _STATION = 4, 55, 7, 11
 _CAPACITY = 1024
 """Frames: 8 s at 120 Hz."""
 
@@ -95,14 +95,15 @@ class PoseRing:
     """The last 1024 frames of S stations. One process writes and one reads; neither waits for the other.
 
     A record is: number, time at which the pose was ready [s], time from the frame's last byte to it [s], status, the
-    configuration (55,), and for each station position (3,) [m] and orientation (4,) in the tracker's frame, quality,
-    and whether position and orientation are valid.
+    configuration (55,), the tracker's origin (3,) [m] and orientation (4,) in the world, NaN where they are not known,
+    and for each station position (3,) [m] and orientation (4,) in the tracker's frame, quality, whether position and
+    orientation are valid, and whether the reading is suspect.
     """
 
     def __init__(self, context: Any, stations: int) -> None:
         """`context` is a `multiprocessing` context."""
         self.stations = stations
-        self.size = _HEAD + _QPOS + _STATION * stations
+        self.size = _HEAD + _QPOS + _ROOM + _STATION * stations
         self._records = context.RawArray("d", _CAPACITY * self.size)
         self._written = context.RawValue("q", 0)
         self._rows: Floats | None = None
@@ -117,9 +118,12 @@ class PoseRing:
         record = self._view()[count % _CAPACITY]
         record[:_HEAD] = pose.number, pose.ready_s, pose.ready_s - frame.received_s, pose.estimate.status
         record[_HEAD : _HEAD + _QPOS] = pose.estimate.qpos
-        stations = record[_HEAD + _QPOS :].reshape(self.stations, _STATION)
+        room = record[_HEAD + _QPOS :][:_ROOM]
+        room[:3], room[3:] = (np.nan, np.nan) if pose.room is None else pose.room
+        stations = record[_HEAD + _QPOS + _ROOM :].reshape(self.stations, _STATION)
         stations[:, :3], stations[:, 3:7], stations[:, 7] = frame.position_m, frame.tracker_from_station, frame.quality
         stations[:, 8], stations[:, 9] = frame.position_valid, frame.orientation_valid
+        stations[:, 10] = frame.suspect
         self._written.value = count + 1
 
     def read(self, after: int) -> tuple[int, Floats]:
@@ -144,17 +148,23 @@ class PoseRing:
         out: Floats = records[:, _HEAD : _HEAD + _QPOS]
         return out
 
+    @staticmethod
+    def room(record: Floats) -> tuple[Floats, Floats] | None:
+        """The tracker's origin (3,) [m] and orientation (4,) in the world, of one record; None if not known."""
+        room = record[_HEAD + _QPOS :][:_ROOM]
+        return None if np.isnan(room).any() else (room[:3], room[3:])
+
     def station_columns(self, records: Floats) -> Floats:
-        """(N, S, 10) columns of the stations of records."""
-        out: Floats = records[:, _HEAD + _QPOS :].reshape(len(records), self.stations, _STATION)
+        """(N, S, 11) columns of the stations of records."""
+        out: Floats = records[:, _HEAD + _QPOS + _ROOM :].reshape(len(records), self.stations, _STATION)
         return out
 
     @staticmethod
     def frame(head: Floats, columns: Floats) -> TrackerFrame:
-        """The readings of a record: its first numbers (4,), and the columns (S, 10) of its stations."""
-        times_s, nothing = np.full(len(columns), head[1]), np.zeros(len(columns), bool)
+        """The readings of a record: its first numbers (4,), and the columns (S, 11) of its stations."""
+        times_s = np.full(len(columns), head[1])
         position_valid, orientation_valid = columns[:, 8] > 0.0, columns[:, 9] > 0.0
         return TrackerFrame(
             float(head[1]), times_s, columns[:, :3], columns[:, 3:7], position_valid, orientation_valid, columns[:, 7],
-            nothing,
+            columns[:, 10] > 0.0,
         )  # fmt: skip

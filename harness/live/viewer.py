@@ -95,10 +95,7 @@ def _prepare_folder(out: Path | None, force: bool) -> None:
     """Make the folder; remove the pictures of another session if `force`, else raise BadFile when there are any."""
     if out is None:
         raise BadInput("--view frames needs a folder.", "Name one with --out DIR.")
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadFile(out, f"it cannot be created ({error.strerror})", "a folder", "Name another.") from error
+    out.mkdir(parents=True, exist_ok=True)
     old = sorted(out.glob(_PICTURE_PATTERN))
     if old and not force:
         advice = "Name another folder, or use --force."

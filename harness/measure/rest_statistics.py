@@ -1,4 +1,4 @@
-"""Spread of the pose of a station at rest, everything included, and the drift of its mean."""
+"""Distances of the readings of a station at rest from its resting pose, and the drift of its mean."""
 
 from collections.abc import Sequence
 
@@ -17,29 +17,29 @@ _ROWS = {"position_m": (0, 1), "rotation_rad": (2, 4)}
 """Rows in `NOISE_KEYS` of the white noise and of the largest drift of a field."""
 
 
-def rest_spread(series: Sequence[StaticSeries], name: str) -> Interval:
-    """Root mean square of the distance (`position_m`) or angle (`rotation_rad`) from the resting pose.
+def rest_distance(series: Sequence[StaticSeries], name: str, share: float) -> Interval:
+    """Distance (`position_m`) or angle (`rotation_rad`) from the resting pose that a share of the readings keeps.
 
-    The interval is that of the mean square over blocks of ten seconds, by Student's t.
+    Outliers that are fewer than the rest do not change it. The interval is that of Woodruff (1952, J. Am. Stat. Assoc.
+    47): the share of readings below the value varies between blocks of ten seconds; its interval, by Student's t, is
+    read off the distribution.
     """
     from scipy import special
 
-    sums: list[tuple[float, int]] = []
+    blocks: list[Floats] = []
     for one in series:
-        squared: Floats = np.sum(getattr(one, name) ** 2, axis=1)
         size = round(_BLOCK_S * one.rate_hz)
-        for begin in range(0, len(one) - size + 1, size):
-            known = squared[begin : begin + size][one.valid[begin : begin + size]]
-            sums.append((float(known.sum()), len(known)))
-    if len(sums) < _FEWEST_BLOCKS:
+        distance: Floats = np.linalg.norm(getattr(one, name), axis=1)
+        rows = [slice(begin, begin + size) for begin in range(0, len(one) - size + 1, size)]
+        blocks += [found for row in rows if len(found := distance[row][one.valid[row]])]
+    if len(blocks) < _FEWEST_BLOCKS:
         return Interval.missing(f"{_FEWEST_BLOCKS * _BLOCK_S:g} s of rest are needed.")
-    above, below = np.array(sums).T
-    ratio = float(above.sum() / below.sum())
-    count = len(above)
-    deviation = float(np.sqrt(count / (count - 1) * np.sum((above - ratio * below) ** 2)) / below.sum())
-    half = float(special.stdtrit(count - 1, 0.975)) * deviation
-    low, middle, high = np.sqrt(np.maximum([ratio - half, ratio, ratio + half], 0.0)).tolist()
-    return Interval(middle, low, high, int(below.sum()))
+    pooled, count = np.concatenate(blocks), len(blocks)
+    value = float(np.quantile(pooled, share))
+    below = np.array([np.mean(block <= value) for block in blocks])
+    half = float(special.stdtrit(count - 1, 0.975) * below.std(ddof=1)) / count**0.5
+    low, high = np.quantile(pooled, np.clip([share - half, share + half], 0.0, 1.0)).tolist()
+    return Interval(value, min(low, value), max(high, value), len(pooled))
 
 
 def mean_drift(

@@ -72,7 +72,10 @@ def motion_format(path: Path) -> str:
         raise BadInput(f"{path.name} is a skeleton without motion.", "Name an AMC file of it.")
     if kind not in CLIP_FORMATS:
         raise BadFile(
-            path, f"the suffix {path.suffix!r}", ", ".join(f".{known}" for known in CLIP_FORMATS), "Rename it?"
+            path,
+            "a folder" if path.is_dir() else f"the suffix {path.suffix!r}",
+            ", ".join(f".{known}" for known in CLIP_FORMATS),
+            "Rename it?",
         )
     return kind
 

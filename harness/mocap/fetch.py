@@ -134,12 +134,7 @@ def _fetch_file(name: str, top: Path, base_url: str) -> Path:
     listed = shipped_sha256().get(name)
     if path.is_file() and listed in (None, sha256_of(path)):
         return path
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(
-            f"{path.parent} cannot be created ({error.strerror}).", "Name another folder with --out."
-        ) from error
+    path.parent.mkdir(parents=True, exist_ok=True)
     url = f"{base_url}/subjects/{name}"
     with atomic_path(path) as new:
         try:

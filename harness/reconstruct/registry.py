@@ -10,13 +10,16 @@ import importlib.util
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from difflib import SequenceMatcher
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from types import ModuleType
 from typing import Any, cast
 
 from harness.core.fields import replace_fields
 from harness.core.options import parse_name, split_outside_brackets
-from harness.core.working_folder import name_module
+from harness.core.working_folder import name_module, served_folders
 from harness.errors import BadInput, HarnessError, RenamedKey, UnknownName
 from harness.reconstruct.contract import Method
 from harness.reconstruct.methods import dynamic_map, expert_map, ik, kernel_cca, local_pca, local_regression
@@ -161,13 +164,18 @@ def _base_method(name: str) -> Method:
         return registered[name]()
     module, colon, attribute = name.partition(":")
     name_module(module)
-    if not colon or not attribute or module in registered or not _module_exists(module):
-        raise UnknownName("method", name, registered)
+    if not colon or (module in registered and not _module_exists(module)):
+        raise UnknownName("method", name, [*registered, *([f"{name}:CLASS"] if name in _modules_served() else [])])
+    if not _module_exists(module):
+        where = " or ".join([*served_folders(), "the installed packages"])
+        raise UnknownName(f"module for {name!r} in {where}", module, _modules_served())
     with _refused(name, "It must import, and need no arguments."):
-        factory = getattr(importlib.import_module(module), attribute, None)
-        if factory is None:
-            raise UnknownName(f"method in {module}", attribute, _public_classes(module))
-        method: Method = factory()
+        content = importlib.import_module(module)
+        if not hasattr(content, attribute):
+            raise UnknownName(
+                f"method in {content.__file__ or module}", attribute, _methods_defined(content, attribute)
+            )
+        method: Method = getattr(content, attribute)()
     missing = [m for m in _REQUIRED_ATTRIBUTES if not hasattr(method, m)]
     if missing:
         raise BadInput(
@@ -188,5 +196,19 @@ def _module_exists(module: str) -> bool:
         return False
 
 
-def _public_classes(module: str) -> list[str]:
-    return sorted(name for name, what in vars(importlib.import_module(module)).items() if inspect.isclass(what))
+def _modules_served() -> list[str]:
+    """Modules of the working folder, and of others in which a user's methods may lie."""
+    return sorted(file.stem for folder in served_folders() for file in Path(folder).glob("*.py"))
+
+
+def _methods_defined(module: ModuleType, near: str) -> list[str]:
+    """Classes with `fit` and functions without arguments that a module defines, the nearest to a name first."""
+    package = module.__name__.partition(".")[0]
+
+    def is_method(what: Any) -> bool:
+        if str(getattr(what, "__module__", "")).partition(".")[0] != package:
+            return False
+        return hasattr(what, "fit") or (inspect.isfunction(what) and not what.__code__.co_argcount)
+
+    defined = [name for name, what in vars(module).items() if is_method(what)]
+    return sorted(defined, key=lambda name: -SequenceMatcher(None, near, name).ratio())

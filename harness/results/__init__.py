@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from harness.results.manifest import Manifest, current_circumstances, describe_run, flatten, source_hash
     from harness.results.reader import (
         BASELINE_FILES,
-        BASELINES,
         COUNT_METRICS,
         SCHEMA,
         CellResult,
@@ -46,7 +45,6 @@ else:
     __getattr__, __dir__ = lazy_names(__name__)
 
 __all__ = [
-    "BASELINES",
     "BASELINE_FILES",
     "COUNT_METRICS",
     "INDEX_FILE",

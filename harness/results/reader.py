@@ -13,7 +13,7 @@ from harness.errors import BadFile, BadInput, MissingExtra, UnknownName
 from harness.results.cell import Cell, cell_folder, read_content, row_of_content
 from harness.results.files.content_types import find_impossible_metric
 from harness.results.files.digests import check_file, check_key, read_result_json
-from harness.results.files.folder_kind import CELLS_FILE
+from harness.results.files.folder_kind import BASELINES, CELLS_FILE
 from harness.results.files.integrity import check_folder, check_row
 from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.manifest import Manifest, flatten
@@ -23,7 +23,6 @@ from harness.score import DEFINITIONS
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-BASELINES = Path("results/baselines")
 BASELINE_FILES = ("manifest.json", "summary.json")
 """Files of a baseline whose digests stand in `CELLS_FILE`."""
 SCHEMA = 2

@@ -19,7 +19,8 @@ from harness.experiment import run as run_scenario
 from harness.experiment.scenarios import Scenario, load_scenario
 from harness.report.comparison.page import comparison_text
 from harness.report.comparison.wording import groups_vary, line_interval
-from harness.results import BASELINES, Manifest, ResultSet, load_results, read_summary
+from harness.results import Manifest, ResultSet, load_results, read_summary
+from harness.results.files import BASELINES
 
 DEFAULT_SCENARIO = "gate"
 """Scenario on which a new baseline is measured by default."""

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from harness.view.live_page import LiveContent
     from harness.view.movie import MOST_METHODS, MOVIE_SUFFIXES, MoviePart, check_movie, write_movie
     from harness.view.page import ViewedMotion, ViewerContent, write_page
-    from harness.view.server import COMMAND_HEADER, EVENTS_PATH, Resource, ViewServer
+    from harness.view.server import COMMAND_HEADER, EVENTS_PATH, Command, Resource, ViewServer
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
@@ -17,6 +17,7 @@ __all__ = [
     "EVENTS_PATH",
     "MOST_METHODS",
     "MOVIE_SUFFIXES",
+    "Command",
     "LiveContent",
     "MoviePart",
     "Resource",

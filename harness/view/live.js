@@ -1,105 +1,226 @@
-// Shows a live session: the newest frame as the server sends it, and the last minute of the line.
+// Shows a live session: its status, the newest frame, the last minute of the line; and sends commands with a token.
 (() => {
   "use strict";
-  const { token, header } = document.getElementById("viewer").dataset, find = (id) => document.getElementById(id);
-  const BODY = { 0: "#e8850c", 1: "#a98a63", 2: "#9aa3ab" }, STATION = ["#20a4a8", "#e0b000", "#d43c3c"];
-  const LINES = ["#e8850c", "#0f9d76", "#c05f9c", "#5b87ad", "#8a6d3b", "#7a68b8"], SECONDS = 60;
-  const root = find("player"), stage = document.createElement("div"), canvas = document.createElement("canvas");
+  const { header } = document.getElementById("viewer").dataset, find = (id) => document.getElementById(id);
+  const WORDS = ["OK", "HELD", "LOST"], SECONDS = 60, TOKEN = "harness-token", APART_M = 0.65;
+  const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const root = find("player"), stage = document.createElement("div"), canvas = document.createElement("canvas"), names = document.createElement("div");
   stage.className = "stage";
   stage.tabIndex = 0;
-  stage.append(canvas);
+  names.className = "names";
+  stage.append(canvas, names);
   root.append(stage);
-  const camera = new MotionCamera(), renderer = new MotionRenderer.Renderer(canvas);
-  let body, frame, pending = 0, heading = null, recording = "";
+  const camera = new MotionCamera();
+  let renderer, body, frame, guided, stations, silent = false, pending = 0, recording = "", said = "", token = takeToken();
 
-  function redraw() {
-    if (!pending) pending = requestAnimationFrame(() => { pending = 0; draw(); });
+  // The token stands behind # in the address that the terminal shows; a tab keeps it, the address bar does not.
+  function takeToken() {
+    const given = location.hash.slice(1);
+    if (given) {
+      sessionStorage.setItem(TOKEN, given);
+      history.replaceState(null, "", location.pathname);
+    }
+    return sessionStorage.getItem(TOKEN) || "";
   }
 
+  function redraw() {
+    if (!pending && renderer) pending = requestAnimationFrame(() => { pending = 0; draw(); });
+  }
+
+  const pointOf = (joints_mm, shift) => (joint) => [0, 1, 2].map((i) => joints_mm[3 * joint + i] / 1000 + shift[i]);
+
   function draw() {
-    if (!frame) return;
+    const parts = [], labels = [], posing = guided && guided.stage === "posing";
+    const add = (point, colour) => {
+      const capsules = new MotionRenderer.Capsules();
+      MotionRenderer.addBody(capsules, body, point, () => MotionRenderer.rgb(colour));
+      parts.push({ capsules, opacity: 1, girth: 1 });
+    };
+    if (posing) {
+      for (const [joints, text, y] of [[guided.wanted_mm, `pose ${guided.number}`, -APART_M], [guided.performer_mm, "you", APART_M]]) {
+        if (!joints) continue;
+        const point = pointOf(joints, [0, y, 0]), [x, , z] = point(0);
+        add(point, css(text === "you" ? "--ink" : "--faint"));
+        labels.push([text, [x, y, z + 1.0], "--ink"]);
+      }
+      camera.target = [0, 0, 0.9];
+    } else if (frame) {
+      const worn = new MotionRenderer.Capsules();
+      const point = pointOf(frame.joints_mm, [0, 0, 0]), at = point(0);
+      camera.target = [at[0], at[1], 0.9];
+      add(point, css(`--${(silent ? "LOST" : WORDS[frame.status]).toLowerCase()}`));
+      frame.stations.forEach((pose, n) => {
+        if (!pose) return;
+        const [x, y, z, ...turn] = pose.map((c) => c / 1000);
+        MotionRenderer.addStation(worn, [x, y, z], turn, MotionRenderer.rgb(css(stations[n].colour)));
+        labels.push([body.stations[n], [x, y, z], stations[n].colour]);
+      });
+      parts.push({ capsules: worn, opacity: 1, girth: 1 });
+    } else return;
     const ratio = Math.min(2, devicePixelRatio || 1), look = MotionRenderer.look();
     canvas.width = Math.round(stage.clientWidth * ratio);
     canvas.height = Math.round(stage.clientHeight * ratio);
-    const point = (joint) => [0, 1, 2].map((i) => frame.joints_mm[3 * joint + i] / 1000), at = point(0);
-    camera.target = [at[0], at[1], 0.9];
-    const colour = MotionRenderer.rgb(BODY[frame.status]), capsules = new MotionRenderer.Capsules(), worn = new MotionRenderer.Capsules();
-    MotionRenderer.addBody(capsules, body, point, () => colour);
-    for (const { pose, state } of frame.stations) {
-      if (pose) MotionRenderer.addStation(worn, pose.slice(0, 3).map((c) => c / 1000), pose.slice(3).map((c) => c / 1000), MotionRenderer.rgb(STATION[state]));
-    }
     renderer.begin(look);
-    renderer.draw([0, 0, canvas.width, canvas.height], camera, look, [{ capsules, opacity: 1, girth: 1 }, { capsules: worn, opacity: 1, girth: 1 }]);
-    root.dataset.drawn = frame.number;
+    renderer.draw([0, 0, canvas.width, canvas.height], camera, look, parts);
+    write(labels);
+    root.dataset.drawn = posing ? `pose ${guided.number}` : frame.number;
   }
 
-  // Lines over the last minute, the newest value at the right; each line is a list with null where there is no value.
-  function chart(id, lines, most, last) {
-    const high = Math.max(most, ...lines.flat().filter((v) => v !== null)) * 1.05 || 1, figure = find(id);
-    const paths = lines.map((values, n) => {
-      const points = values.map((v, k) => (v === null ? null : `${((SECONDS - values.length + k + 1) * 300) / SECONDS},${70 - (66 * v) / high}`));
-      return `<polyline points="${points.filter((p) => p).join(" ")}" fill="none" stroke="${LINES[n % LINES.length]}" stroke-width="1.5" vector-effect="non-scaling-stroke"/>`;
+  // Names beside the stations, where the camera sees them.
+  function write(labels) {
+    const m = camera.matrix(stage.clientWidth / stage.clientHeight);
+    while (names.children.length > labels.length) names.lastChild.remove();
+    labels.forEach(([text, p, colour], n) => {
+      const label = names.children[n] || names.appendChild(document.createElement("span"));
+      const clip = [0, 1, 3].map((row) => m[row] * p[0] + m[4 + row] * p[1] + m[8 + row] * p[2] + m[12 + row]);
+      label.textContent = text;
+      label.style.borderLeft = `4px solid var(${colour})`;
+      label.style.left = `${(clip[0] / clip[2] * 0.5 + 0.5) * 100}%`;
+      label.style.top = `${(0.5 - 0.5 * clip[1] / clip[2]) * 100}%`;
+      label.style.transform = "translate(0.9rem, -50%)";
     });
-    let svg = figure.querySelector("svg");
-    if (!svg) {
-      svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-      svg.setAttribute("viewBox", "0 0 300 72");
-      svg.setAttribute("preserveAspectRatio", "none");
-      figure.prepend(svg);
-      figure.dataset.text = figure.querySelector("figcaption").textContent;
-    }
-    svg.innerHTML = paths.join("");
-    figure.querySelector("figcaption").textContent = `${figure.dataset.text}: ${last}`;
+  }
+
+  // The least round number that is not below a value.
+  function roundUp(value) {
+    const power = 10 ** Math.floor(Math.log10(value));
+    return [1, 2, 3, 4, 5, 6, 8, 10].map((n) => n * power).find((n) => n >= value * 0.999);
+  }
+
+  // Lines over the last minute with the newest value at the right, from 0 to a round number; null leaves a gap.
+  function chart(plot, lines, least, unit, colour, most = 0) {
+    const top = most || roundUp(Math.max(least, ...lines.flat().filter((v) => v !== null)));
+    const grid = [0, 25, 50, 75].map((x) => `<path d="M${3 * x} 0V100" stroke="var(--rule)" vector-effect="non-scaling-stroke"/>`).join("");
+    const half = '<path d="M0 50H300" stroke="var(--rule)" vector-effect="non-scaling-stroke"/>';
+    const paths = lines.map((values, n) => {
+      let path = "", gap = true;
+      values.forEach((v, k) => {
+        const x = ((SECONDS - values.length + k + 1) * 300) / SECONDS;
+        if (v !== null) path += `${gap ? "M" : "L"}${x.toFixed(1)} ${(98 - (96 * Math.min(v, top)) / top).toFixed(1)}`;
+        gap = v === null;
+      });
+      return `<path class="line" d="${path}" fill="none" stroke="var(${colour})" stroke-width="2" ${n ? 'stroke-dasharray="3 3"' : ""} vector-effect="non-scaling-stroke"/>`;
+    });
+    plot.querySelector("svg").innerHTML = grid + half + paths.join("");
+    plot.querySelector(".top").textContent = `${top} ${unit}`;
+  }
+
+  function setWord(element, word, text) {
+    element.dataset.word = word;
+    (element.querySelector("b") || element).textContent = word;
+    if (text !== undefined) element.querySelector("span").textContent = text;
   }
 
   function showStatus(status) {
     const seconds = status.seconds, last = seconds[seconds.length - 1];
-    const gone = body.stations.filter((_, n) => status.lost[n]);
-    find("alarm").textContent = status.silent ? `no data for ${status.silent_s.toFixed(1)} s` : gone.length ? `lost: ${gone.join(", ")}` : "";
-    find("stations").replaceChildren(...body.stations.map((name, n) => {
-      const item = document.createElement("li"), dot = document.createElement("i");
-      dot.style.background = status.lost[n] ? STATION[2] : LINES[n % LINES.length];
-      item.append(dot, `${name} ${status.lost[n] ? "lost" : last ? `${Math.round(100 * last.quality[n])} %` : ""}`);
-      return item;
-    }));
-    recording = status.recording;
+    setWord(find("session"), status.session, status.why);
+    if (silent !== status.silent) redraw((silent = status.silent));
+    stations.forEach(({ row }, n) => setWord(row.querySelector(".word"), status.stations[n]));
+    recording = status.recording || "";
     find("record").textContent = recording ? "Stop recording" : "Record";
-    if (recording) find("said").textContent = `recording into ${recording}`;
+    if (status.failure) say(`the recording has ended: ${status.failure}`);
+    else if (recording) say(`recording into ${recording}`);
     if (!last) return;
-    chart("rate", [seconds.map((s) => s.rate_hz)], 1, last.rate_hz.toFixed(1));
-    chart("loss", [seconds.map((s) => 100 * s.loss)], 5, (100 * last.loss).toFixed(1));
-    chart("latency", ["p50_ms", "p99_ms"].map((name) => seconds.map((s) => s[name])), 1, last.p50_ms === null ? "–" : `${last.p50_ms.toFixed(1)}, ${last.p99_ms.toFixed(1)}`);
-    chart("quality", body.stations.map((_, n) => seconds.map((s) => s.quality[n])), 1, last.quality.map((q) => q.toFixed(2)).join(" "));
+    stations.forEach(({ row, colour }, n) => {
+      row.querySelector("output").textContent = `${Math.round(100 * last.quality[n])} %`;
+      chart(row, [seconds.map((s) => 100 * s.quality[n])], 100, "%", colour, 100);
+    });
+    const one = (value) => (value === null ? "–" : value.toFixed(1));
+    for (const [id, lines, least, unit, now] of [
+      ["rate", [seconds.map((s) => s.rate_hz)], 10, "Hz", `${one(last.rate_hz)} Hz`],
+      ["loss", [seconds.map((s) => 100 * s.loss)], 10, "%", `${one(100 * last.loss)} %`],
+      ["latency", [seconds.map((s) => s.p50_ms), seconds.map((s) => s.p99_ms)], 2, "ms", `${one(last.p50_ms)} and ${one(last.p99_ms)} ms`],
+    ]) {
+      chart(find(id), lines, least, unit, "--ink");
+      find(id).querySelector("output").textContent = now;
+    }
     root.dataset.status = seconds.length;
   }
 
-  async function record() {
-    const button = find("record");
+  function showCalibration(state) {
+    guided = state;
+    const panel = find("calibration"), posing = state.stage === "posing", title = { posing: `Pose ${state.number} of ${state.poses}: ${state.name}`, solving: "Solving", done: "Calibrated", failed: "Not calibrated" };
+    panel.hidden = false;
+    panel.dataset.stage = state.stage;
+    panel.querySelector("h2").textContent = title[state.stage];
+    panel.querySelector(".instruction").textContent = posing ? state.instruction : "";
+    panel.querySelector("progress").hidden = !posing;
+    panel.querySelector("progress").value = state.still_share || 0;
+    panel.querySelector("ul").replaceChildren(...state.lines.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+    panel.querySelector("details").hidden = !state.report;
+    panel.querySelector("pre").textContent = state.report || "";
+    for (const button of document.querySelectorAll("[data-kind]")) {
+      button.dataset.text = button.dataset.text || button.textContent;
+      button.textContent = posing && button.dataset.kind === state.kind ? "Stop calibration" : button.dataset.text;
+      button.disabled = state.stage === "solving" || (posing && button.dataset.kind !== state.kind);
+    }
+    redraw();
+  }
+
+  function say(text) {
+    if (text !== said) find("said").textContent = said = text;
+  }
+
+  function setReader(reader) {
+    find("reader").hidden = !reader;
+    for (const button of document.querySelectorAll(".controls button")) button.hidden = reader;
+  }
+
+  // Sends a command and says what came of it; `describe` makes a text of the answer.
+  async function command(button, name, content, describe) {
+    if (!token || button.disabled) return;
     button.disabled = true;
     try {
-      const answer = await fetch("/command/record", { method: "POST", headers: { "Content-Type": "application/json", [header]: token }, body: JSON.stringify({ on: !recording }) });
+      const answer = await fetch(`/command/${name}`, { method: "POST", headers: { "Content-Type": "application/json", [header]: token }, body: JSON.stringify(content) });
+      if (answer.status === 403) setReader(true);
       if (!answer.ok) throw new Error((await answer.text()).trim());
-      const done = await answer.json();
-      recording = done.recording;
-      button.textContent = recording ? "Stop recording" : "Record";
-      find("said").textContent = recording ? `recording into ${recording}` : `saved ${done.saved}`;
+      say(describe(await answer.json()));
     } catch (error) {
-      find("said").textContent = error.message;
+      say(error.message);
     }
     button.disabled = false;
   }
 
+  function prepareCommands() {
+    const actions = {
+      heading: (button) => command(button, "heading", {}, (done) => `heading reset by ${done.turn_deg.toFixed(0)}°`),
+      record: (button) => command(button, "record", { on: !recording }, (done) => {
+        recording = done.recording;
+        button.textContent = recording ? "Stop recording" : "Record";
+        return recording ? `recording into ${recording}` : `saved ${done.saved}`;
+      }),
+    };
+    for (const [id, action] of Object.entries(actions)) find(id).addEventListener("click", () => action(find(id)));
+    for (const button of document.querySelectorAll("[data-kind]")) {
+      button.addEventListener("click", () => command(button, "calibrate", { kind: guided && guided.stage === "posing" ? "" : button.dataset.kind }, () => ""));
+    }
+    addEventListener("keydown", (event) => {
+      const id = { h: "heading", r: "record" }[event.key.toLowerCase()];
+      if (id && !event.ctrlKey && !event.metaKey && !event.altKey && !event.repeat) actions[id](find(id));
+    });
+    setReader(!token);
+    addEventListener("hashchange", () => setReader(!(token = takeToken())));
+  }
+
   async function begin() {
     body = await (await fetch("/body.json")).json();
-    MotionCamera.control(stage, camera, redraw, () => camera.reset(heading || 0));
-    new ResizeObserver(redraw).observe(stage);
-    find("record").addEventListener("click", record);
+    stations = [...find("stations").children].map((row) => ({ row, colour: row.dataset.colour }));
+    try {
+      renderer = new MotionRenderer.Renderer(canvas);
+      MotionCamera.control(stage, camera, redraw, () => { camera.reset(0); redraw(); });
+      new ResizeObserver(redraw).observe(stage);
+      matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+    } catch (error) {
+      names.textContent = `No picture: ${error.message}.`;
+    }
+    prepareCommands();
     follow();
     root.dataset.ready = "yes";
   }
 
   // Asks for news again and again. A browser has six connections for all tabs of a host: no tab keeps one, and a hidden tab asks for nothing.
   async function follow() {
+    const show = { frame: showFrame, status: showStatus, calibration: showCalibration };
     for (let last = 0; ; ) {
       if (document.hidden) await new Promise((resolve) => document.addEventListener("visibilitychange", resolve, { once: true }));
       try {
@@ -107,9 +228,10 @@
         if (!answer.ok) throw new Error(await answer.text());
         const news = await answer.json();
         last = news.last;
-        for (const [kind, content] of news.messages) (kind === "frame" ? showFrame : showStatus)(content);
+        for (const [kind, content] of news.messages) show[kind](content);
       } catch {
-        find("alarm").textContent = "the session has ended";
+        setWord(find("session"), "LOST", "the session has ended");
+        for (const { row } of stations) setWord(row.querySelector(".word"), "LOST");
         await new Promise((resolve) => setTimeout(resolve, 1000));
       }
     }
@@ -117,7 +239,6 @@
 
   function showFrame(newest) {
     frame = newest;
-    if (heading === null) camera.reset(heading = 0);
     redraw();
   }
   begin();

@@ -1,25 +1,38 @@
-"""The page of a live session: body and stations in 3-D, and charts of the line, from events of the server."""
+"""The page of a live session: status, body and stations in 3-D, charts of the line, and commands with a token.
+
+The page carries no token. A reader has it from the part of the address behind `#`, which only the starter of the
+session knows; without it the page shows everything and offers no command.
+"""
 
 import json
 from collections.abc import Sequence
 from importlib.resources import files
+from itertools import cycle
 
 from harness.core.skeleton import Skeleton
-from harness.report.kit import describe_body, page_style, player_element, player_script, tag
+from harness.report.kit import Markup, describe_body, page_style, player_element, player_script, tag
 from harness.view.page import viewer_page
 from harness.view.server import Resource
+
+STATUS_COLOURS = {"OK": "#00795c", "HELD": "#f2c200", "LOST": "#c8321e"}
+STATION_COLOURS = ("#248bf2", "#8c4d82", "#6262b2", "#b28695", "#8b24f2", "#978fbf")
+"""Colours of the stations, in turn. No two of them or of a status are alike, also for colour-blind readers. Their
+contrast is about 3 or more to a light and to a dark page."""
+_CALIBRATIONS = {"tpose": "Calibrate: T-pose", "poses": "Calibrate: eight poses"}
 
 
 class LiveContent:
     """What the server answers for a live session besides its events."""
 
-    def __init__(self, title: str, skeleton: Skeleton, stations: Sequence[str], token: str) -> None:
-        script = files(__package__).joinpath("live.js").read_text(encoding="utf-8")
+    def __init__(
+        self, title: str, skeleton: Skeleton, stations: Sequence[str], calibrations: Sequence[str] = ()
+    ) -> None:
+        """`calibrations` are the kinds that the page offers: `tpose` and `poses`."""
         body = {**describe_body(skeleton), "stations": list(stations)}
         self._resources = {
-            "/": Resource("text/html; charset=utf-8", _page(title, token)),
+            "/": Resource("text/html; charset=utf-8", _page(title, stations, calibrations)),
             "/viewer.css": Resource("text/css; charset=utf-8", page_style().encode()),
-            "/live.js": Resource("text/javascript; charset=utf-8", f"{player_script()}\n{script}".encode()),
+            "/live.js": Resource("text/javascript; charset=utf-8", f"{player_script()}\n{_text('live.js')}".encode()),
             "/body.json": Resource("application/json", json.dumps(body).encode()),
         }
 
@@ -28,37 +41,79 @@ class LiveContent:
         return self._resources.get(path)
 
 
-def _page(title: str, token: str) -> bytes:
+def _page(title: str, stations: Sequence[str], calibrations: Sequence[str]) -> bytes:
+    rows = [
+        tag(
+            "li",
+            tag("span", tag("i", style=f"background: var({colour})"), name),
+            tag("b", "LOST", class_="word", data_word="LOST"),
+            tag("output", "–"),
+            _plot(),
+            data_colour=colour,
+        )
+        for name, colour in zip(stations, cycle(f"--station-{n}" for n in range(len(STATION_COLOURS))), strict=False)
+    ]
     charts = [
-        tag("figure", tag("figcaption", text), id_=name, class_="line-chart")
+        tag("figure", tag("figcaption", text, " ", tag("output")), _plot(), _TIME_AXIS, id_=name)
         for name, text in (
-            ("rate", "frames per second"),
-            ("loss", "lost readings [%]"),
-            ("latency", "latency, p50 and p99 [ms]"),
-            ("quality", "quality of each station"),
+            ("rate", "Poses:"),
+            ("loss", "Readings lost:"),
+            ("latency", "Latency, p50 (line), p99 (dashes):"),
         )
     ]
+    buttons = [
+        tag("button", "Reset heading", id_="heading", type_="button", title="key H"),
+        *(tag("button", _CALIBRATIONS[kind], type_="button", data_kind=kind) for kind in calibrations),
+        tag("button", "Record", id_="record", type_="button", title="key R"),
+    ]
+    reader = "You can look and not command. Commands need the address that `harness live` shows in its terminal."
+    calibration = tag(
+        "section",
+        tag("h2"),
+        tag("p", class_="instruction"),
+        tag("progress", max=1, value=0),
+        tag("ul"),
+        tag("details", tag("summary", "Report"), tag("pre")),
+        id_="calibration",
+        hidden=True,
+    )
     return viewer_page(
         title,
         "harness live",
-        _STYLE,
-        player_element("The body and its stations in 3-D; drag to turn"),
-        tag("p", tag("button", "Record", id_="record", type_="button"), tag("output", id_="said"), class_="controls"),
-        tag("ul", id_="stations"),
-        tag("div", *charts, id_="charts"),
+        _style(),
+        tag("p", tag("b", "LOST"), tag("span", "no pose yet"), id_="session", role="status", data_word="LOST"),
+        tag("p", *buttons, tag("output", id_="said"), class_="controls"),
+        tag("p", reader, id_="reader", hidden=True),
+        tag(
+            "main",
+            tag("div", calibration, player_element("The body and its stations in 3-D; drag to turn")),
+            tag(
+                "section",
+                tag("h2", "Stations and their quality"),
+                tag("ul", *rows, id_="stations"),
+                _TIME_AXIS,
+                tag("div", *charts, id_="charts"),
+            ),
+        ),
         script="/live.js",
-        token=token,
-        header=tag("p", id_="alarm", role="status"),
+        token="",  # a reader has it from the address
     )
 
 
-_STYLE = """
-h1 { margin: 0; font-size: 1.2rem; }
-#alarm { min-height: 1.6em; margin: 0; color: #c2182b; font-weight: 600; }
-.motion-player .stage { height: max(19rem, calc(100vh - 21rem)); }
-#stations { display: flex; flex-wrap: wrap; gap: 0.3rem 1.2rem; margin: 0.4rem 0; padding: 0; list-style: none; }
-#stations i { display: inline-block; width: 0.8em; height: 0.8em; margin-right: 0.35em; border-radius: 50%; }
-#charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(14rem, 1fr)); gap: 0.6rem 1.2rem; }
-.line-chart { margin: 0; }
-.line-chart svg { display: block; width: 100%; height: 4.5rem; background: var(--raised); }
-"""
+def _plot() -> Markup:
+    """A chart without lines: labels of its axis and a place for the lines."""
+    labels = tag("span", class_="top"), tag("span", "0", class_="zero")
+    return tag("div", *labels, Markup('<svg viewBox="0 0 300 100" preserveAspectRatio="none"></svg>'), class_="plot")
+
+
+_TIME_AXIS = tag("p", tag("span", "60 s ago"), tag("span", "30 s"), tag("span", "now"), class_="time")
+
+
+def _style() -> str:
+    colours = [f"--{word.lower()}: {colour};" for word, colour in STATUS_COLOURS.items()]
+    colours += [f"--station-{n}: {colour};" for n, colour in enumerate(STATION_COLOURS)]
+    return f":root {{ {' '.join(colours)} }}\n{_text('live.css')}"
+
+
+def _text(name: str) -> str:
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")

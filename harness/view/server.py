@@ -1,7 +1,8 @@
 """A small web server on the loopback interface: fixed pages, the newest events, and commands.
 
 It answers requests that name itself as their host, so that a page of another site cannot reach it under another name.
-Addresses are looked up among those of its content; it opens no file. Commands need a token that its own page knows.
+Addresses are looked up among those of its content; it opens no file. Commands need a token, and browsers may send them
+from its own page alone.
 Pages ask for events again and again. A browser has six connections for all its tabs, and no tab may keep one.
 """
 
@@ -94,7 +95,7 @@ class ViewServer:
         self.board = EventBoard()
         self.token = token or secrets.token_urlsafe(24)
         handler = type("ViewHandler", (_RequestHandler,), {"view": self})
-        self._lookup, self._commands = lookup, dict(commands or {})
+        self._lookup, self._commands = lookup, {} if commands is None else commands
         self._server = _HttpServer(("127.0.0.1", 0), handler)
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(_SHUTDOWN_POLL_S,), name="view server", daemon=True
@@ -173,6 +174,8 @@ class _RequestHandler(BaseHTTPRequestHandler):
         token = self.headers.get(COMMAND_HEADER, "")
         if not self._is_own_host():
             self._refuse(HTTPStatus.FORBIDDEN, "this server answers to its own name only")
+        elif not self._is_own_page():
+            self._refuse(HTTPStatus.FORBIDDEN, "commands come from the page of this server only")
         elif not secrets.compare_digest(token.encode(), self.view.token.encode()):
             self._refuse(HTTPStatus.FORBIDDEN, "the token is missing or wrong")
         elif command is None:
@@ -205,8 +208,18 @@ class _RequestHandler(BaseHTTPRequestHandler):
             else:
                 self._send(HTTPStatus.OK, resource)
 
+    def _own_names(self) -> set[str]:
+        return {f"{name}:{self.view.port}" for name in ("127.0.0.1", "localhost")}
+
     def _is_own_host(self) -> bool:
-        return self.headers.get("Host", "") in {f"{name}:{self.view.port}" for name in ("127.0.0.1", "localhost")}
+        hosts = self.headers.get_all("Host", [])
+        return len(hosts) == 1 and hosts[0] in self._own_names()
+
+    def _is_own_page(self) -> bool:
+        """Whether a command comes from this server's page, or from a program that is no browser."""
+        own = {f"http://{name}" for name in self._own_names()}
+        sites = self.headers.get_all("Sec-Fetch-Site", [])
+        return set(self.headers.get_all("Origin", [])) <= own and set(sites) <= {"same-origin"}
 
     def _refuse(self, status: HTTPStatus, text: str) -> None:
         if self.command == "POST":  # its body may be unread

@@ -19,7 +19,7 @@ def test_it_names_the_file_its_size_and_a_caption(
     )
     assert lines[-1] == "pass"
     assert Path("r.svg").is_file()
-    assert "r.svg exists." in command("plot", ranked, "--out", "r.svg", code=2).err
+    assert "r.svg: it exists" in command("plot", ranked, "--out", "r.svg", code=2).err
     said = command("plot", ranked, "--out", "r.svg", "--force", "--json").content
     assert (said["path"], said["kind"], said["width_mm"], said["outcome"]) == ("r.svg", "ranking", 85.0, "pass")
 

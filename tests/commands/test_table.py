@@ -64,3 +64,27 @@ def test_what_is_refused_says_why(words: str, said: str, ranked: Path, tmp_path:
     assert ended.out == ""
     assert said in ended.err.splitlines()[0]
     assert not list(tmp_path.iterdir())
+
+
+def test_several_results_have_a_column_each(
+    ranked: Path, conditions: Path, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run, its baseline by name, and a run of other methods and conditions."""
+    monkeypatch.chdir(tmp_path)
+    command("baseline", "save", "kept", ranked)
+    words = ("table", f"old={ranked}", "kept", f"other={conditions}", "--metrics", "mpjpe_mm,jitter_m_s3")
+    rows = list(csv.DictReader(command(*words, "--format", "csv").lines))
+    alone = list(csv.DictReader(command("table", ranked, "--format", "csv", "--metrics", "mpjpe_mm").lines))
+    assert [row["method"] for row in rows[:4]] == [row["method"] for row in alone]
+    for part in ("", ".low", ".high", ".clips", ".standing"):
+        assert [row[f"old{part}"] for row in rows[:4]] == [row[f"kept{part}"] for row in rows[:4]]
+        assert [row[f"old{part}"] for row in rows[:4]] == [row[f"mpjpe_mm{part}"] for row in alone]
+    assert {row["other"] for row in rows[:4]} == {""}
+    assert {row["metric"] for row in rows} == {"mpjpe_mm", "jitter_m_s3"}
+    assert {(row["noise"], row["performers"]) for row in rows if row["other"]} == {
+        (noise, performer) for noise in ("clean", "default") for performer in ("known", "new")
+    }
+    assert command(*words).lines[0] == "| metric | noise | performers | method | clips | old | kept | other |"
+    assert r"joint position error [mm] & \-- & ".replace("\\-- & ", "") in command(*words, "--format", "latex").out
+    assert command(*words, "--json").content["results"] == ["old", "kept", "other"]
+    assert "is named 2 times" in command("table", ranked, ranked, code=2).err

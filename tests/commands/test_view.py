@@ -109,7 +109,7 @@ def test_a_recording_of_an_unknown_room_shows_its_stations(
         (["{run}", "--clip", "golf_p1_01"], "no clip called 'golf_p1_01'"),
         (["{run}", "--scenario", "demo"], "A run takes no --scenario"),
         (["{run}", "--save", "a.avi"], "Its end must be .mp4 or .gif"),
-        (["{run}", "--out", "{text}"], "text.rec exists. Name another file, or use --force."),
+        (["{run}", "--out", "{text}"], "Choose another name, or overwrite it with --force."),
     ],
 )
 def test_what_cannot_be_shown_is_refused(
@@ -159,6 +159,7 @@ def test_a_movie_is_written(viewed: Path, tmp_path: Path, command: Command, rend
 def test_the_server_shows_the_run_until_ctrl_c(viewed: Path) -> None:
     with start_harness("view", viewed, "--no-browser") as process:
         assert process.stderr is not None
+        assert process.stderr.readline() == "view: loading\n"
         line = process.stderr.readline()
         address = re.search(r"http://127\.0\.0\.1:(\d+)/", line)
         assert address is not None, line

@@ -274,7 +274,7 @@ def read_cells_of(out: Path) -> list[Any]:
         ({"clips": '["walking_p1_1"]'}, "Did you mean 'walking_p1_01'"),
         ({"methods": '["ik:previos"]'}, "Did you mean 'ik:previous'"),
         ({"noise": '["cleen"]'}, "Did you mean 'clean'"),
-        ({"tracker.rate_hz": '["fast"]'}, "expected float"),
+        ({"tracker.rate_hz": '["fast"]'}, "expected a number"),
         ({"tracker.rate_hz": "[20.0, 20.0]"}, "not a list of different values"),
         ({"seeds": "[1, 1]"}, "seeds names something twice"),
         ({"metods": '["ik"]'}, "Did you mean 'methods'"),

@@ -3,33 +3,47 @@
 import http.client
 import json
 import multiprocessing
-import re
+import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 from threading import Thread
+from types import MappingProxyType
 from typing import Any
 from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import numpy as np
 import pytest
 
-from harness.body import Kinematics, build_body
+from harness.body import Kinematics, build_body, tpose
+from harness.calibrate import read_calibration
 from harness.core import rotations
-from harness.errors import BadFile
+from harness.core.calibration import Calibration
+from harness.core.estimate import Estimate, Status
+from harness.core.motion import BodyMotion
+from harness.experiment import CalibrationSession, prepare_playback
 from harness.live.browser_view import BrowserOutput, _run_process
 from harness.live.pose import SessionSetup
+from harness.live.session import LiveOptions, run_session
+from harness.live.session_control import SessionControl
 from harness.live.shared_memory import PoseRing
 from harness.live.viewer import _run_viewer_process
+from harness.simulate import simulate_tracker
+from harness.stream import TrackerFrame
 from harness.stream.is900.codec import WireFormat
 from harness.stream.recording import RecordingSwitch, read_recording
 from harness.view import COMMAND_HEADER
 from tests.live.posing import configuration, live_pose
+from tests.live.streams import Paced
 
 pytestmark = pytest.mark.long
 BODY = build_body()
-ROOM = rotations.IDENTITY, np.array([0.0, 0.0, 2.5])
-SETUP = SessionSetup(BODY.skeleton, ("head", "torso"), 90.0, ROOM, "a session")
+ROOM = np.array([0.0, 0.0, 2.5]), rotations.IDENTITY
+SETUP = SessionSetup(BODY.skeleton, ("head", "torso"), 90.0, "a session")
 
 
 @pytest.fixture
@@ -41,7 +55,7 @@ def switch() -> RecordingSwitch:
 
 @pytest.fixture
 def shown(tmp_path: Path, switch: RecordingSwitch) -> Iterator[BrowserOutput]:
-    output = BrowserOutput(SETUP, switch, tmp_path)
+    output = BrowserOutput(SETUP, SessionControl(switch), tmp_path)
     try:
         yield output
     finally:
@@ -64,29 +78,47 @@ def newest(output: BrowserOutput, kind: str) -> dict[str, Any]:
             return content
 
 
-def record(output: BrowserOutput, on: bool) -> tuple[int, str]:
+def command(output: BrowserOutput, name: str, content: dict[str, Any], **headers: str) -> tuple[int, str]:
+    """Status and text of the answer to a command with the token of the address, unless `headers` have another."""
+    headers = {COMMAND_HEADER: urlsplit(output.url).fragment} | {
+        key.replace("_", "-"): text for key, text in headers.items()
+    }
     connection = connect(output)
-    connection.request("GET", "/")
-    token = re.search(r'data-token="([^"]+)"', connection.getresponse().read().decode())
-    assert token is not None
-    connection.request("POST", "/command/record", json.dumps({"on": on}), {COMMAND_HEADER: token[1]})
+    connection.request("POST", f"/command/{name}", json.dumps(content), headers)
     answer = connection.getresponse()
     status, text = answer.status, answer.read().decode()
     connection.close()
     return status, text
 
 
+def ask(
+    output: BrowserOutput, method: str, path: str, headers: Mapping[str, str] = MappingProxyType({})
+) -> tuple[int, str]:
+    """Status of the answer to a request without a body, and its headers and text."""
+    with closing(connect(output)) as connection:
+        connection.request(method, path, headers=headers)
+        answer = connection.getresponse()
+        return answer.status, f"{answer.getheaders()} {answer.read().decode()}"
+
+
+def record(output: BrowserOutput, on: bool) -> tuple[int, str]:
+    return command(output, "record", {"on": on})
+
+
 def test_the_page_gets_the_newest_pose(shown: BrowserOutput, rng: np.random.Generator) -> None:
     kinematics, qpos = Kinematics(BODY), configuration(rng)
     for number in range(200):
-        pose = live_pose(qpos, number, time.monotonic(), kinematics)
+        pose = replace(live_pose(qpos, number, time.monotonic(), kinematics), room=ROOM)
         shown.send(pose)
     time.sleep(0.5)
     frame = newest(shown, "frame")
     assert frame["number"] == 199
     joints_m = np.reshape(frame["joints_mm"], (25, 3)) / 1e3
     np.testing.assert_allclose(joints_m, pose.joints_m, atol=6e-4)
-    assert frame["stations"] == [{"quality": 1.0, "state": 0, "pose": [0, 0, 2500, 1000, 0, 0, 0]}] * 2
+    assert frame["stations"] == [[0, 0, 2500, 1000, 0, 0, 0]] * 2
+    shown.send(live_pose(qpos, 200, time.monotonic(), kinematics))
+    time.sleep(0.5)
+    assert newest(shown, "frame")["stations"] == [None, None], "where the room is not known"
 
 
 def test_a_line_that_falls_silent_is_reported_within_a_second(shown: BrowserOutput, rng: np.random.Generator) -> None:
@@ -94,21 +126,146 @@ def test_a_line_that_falls_silent_is_reported_within_a_second(shown: BrowserOutp
     began = time.monotonic()
     while not (status := newest(shown, "status"))["silent"]:
         time.sleep(0.05)
-    assert status["lost"] == [True, True]
+    assert (status["session"], status["stations"]) == ("LOST", ["LOST", "LOST"])
     assert time.monotonic() - began < 1.5
 
 
 def test_the_page_starts_and_stops_a_recording(shown: BrowserOutput, switch: RecordingSwitch, tmp_path: Path) -> None:
     status, text = record(shown, True)
-    path = Path(json.loads(text)["recording"])
-    assert (status, path.parent) == (200, tmp_path)
-    assert switch.path == path
+    path = tmp_path / json.loads(text)["recording"]
+    assert (status, switch.path) == (200, path)
     assert record(shown, True)[0] == 422
     status, text = record(shown, False)
     assert (status, json.loads(text)["saved"]) == (200, str(path))
     assert read_recording(path).formats[0].stations == ("head", "torso")
     status, text = record(shown, False)
     assert (status, text) == (422, "No recording runs. Start one first.\n")
+
+
+def test_the_page_learns_that_a_recording_has_failed(shown: BrowserOutput, switch: RecordingSwitch) -> None:
+    record(shown, True)
+    switch.on_configured(WireFormat(("head",), 40.0))  # a device that comes back with other stations
+    until_s = time.monotonic() + 20.0
+    while "Record other stations" not in newest(shown, "status").get("failure", ""):
+        assert time.monotonic() < until_s
+        time.sleep(0.05)
+    assert newest(shown, "status")["recording"] == ""
+
+
+@pytest.mark.parametrize("name", ["record", "heading", "calibrate"])
+def test_others_can_look_and_not_command(
+    shown: BrowserOutput, switch: RecordingSwitch, tmp_path: Path, name: str
+) -> None:
+    """Another user of the computer opens the page: nothing that they can read has the token."""
+    host, token = urlsplit(shown.url).netloc, urlsplit(shown.url).fragment
+    assert len(token) >= 32
+    content = {"on": True, "kind": "tpose"}
+    for path in ("/", "/live.js", "/viewer.css", "/body.json", "/events"):
+        status, answer = ask(shown, "GET", path)
+        assert status == 200
+        assert token not in answer
+    for method in ("GET", "HEAD", "PUT", "OPTIONS"):
+        assert ask(shown, method, f"/command/{name}", {COMMAND_HEADER: token})[0] in (404, 501)
+    for wrong in ("", "x", token[:-1], token + "x", token.swapcase()):
+        assert command(shown, name, content, **{COMMAND_HEADER: wrong})[0] == 403
+    for origin in ("http://evil.example", "null", "http://127.0.0.1:1", f"https://{host}", f"http://{host}.evil"):
+        assert command(shown, name, content, Origin=origin)[0] == 403
+    for site in ("cross-site", "same-site", "none"):
+        assert command(shown, name, content, Sec_Fetch_Site=site)[0] == 403
+    assert command(shown, name, content, Host="evil.example")[0] == 403
+    assert command(shown, name, {**content, "more": 70_000 * "x"})[0] == 413
+    assert switch.path is None
+    assert not list(tmp_path.iterdir())
+    own = {"Origin": f"http://{host}", "Sec_Fetch_Site": "same-origin"}
+    assert command(shown, "record", {"on": True}, **own)[0] == 200
+
+
+def test_the_browser_gets_the_token_from_a_file_of_this_user(
+    shown: BrowserOutput, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All users of a computer can read the command line of a browser."""
+    opened: list[str] = []
+
+    def open_browser(url: str) -> bool:
+        opened.append(url)
+        return True
+
+    monkeypatch.setattr("webbrowser.open", open_browser)
+    assert shown.open_browser()
+    path = Path(url2pathname(urlsplit(opened[0]).path))
+    assert urlsplit(shown.url).fragment not in opened[0]
+    assert shown.url in path.read_text()
+    assert os.name != "posix" or path.stat().st_mode & 0o077 == 0
+    shown.close()
+    assert not path.exists()
+
+
+class Standing:
+    """A method of a body in T-pose."""
+
+    def begin(self, calibration: Calibration) -> "Standing":
+        return self
+
+    def step(self, frame: TrackerFrame) -> Estimate:
+        return Estimate(tpose(BODY.skeleton), Status.SOLVED)
+
+
+def test_a_calibration_from_the_page_is_used_and_saved(tmp_path: Path) -> None:
+    """A performer stands in T-pose half a metre aside, and the session does not know where its tracker hangs."""
+    worn = prepare_playback("demo", clip="boxing_p1_01", stations=4, noise="clean")
+    names, skeleton = tuple(worn.scenario.stations), worn.body.skeleton
+    upright = np.array(tpose(skeleton))
+    upright[1] += 0.5
+    take = BodyMotion("stand", "p1", "test", "", 40.0, np.tile(upright, (400, 1)))
+    standing = simulate_tracker(
+        worn.body, take, worn.scenario.nominal_mounts, worn.tracker, worn.scenario.noise_model, seed=1
+    )
+    calibrations = {"tpose": CalibrationSession("demo", names, "tpose", skeleton=skeleton)}
+    control, states, numbers = SessionControl(), list[dict[str, Any]](), list[int]()
+    output = BrowserOutput(SessionSetup(skeleton, names, 40.0, "a session", calibrations), control, tmp_path)
+    stream = Paced(cycle(standing.frames), 0.025, stations=names)
+    wrong = replace(worn.calibration, tracker_origin_m=np.array([3.0, 0.0, 2.0]))
+    arguments = (stream, worn.body, Standing(), wrong, [output], LiveOptions(40.0))
+    session = Thread(target=run_session, args=arguments, kwargs={"control": control})
+    session.start()
+    try:
+        assert command(output, "calibrate", {"kind": "kneeling"}) == (
+            422,
+            "No calibration 'kneeling'. There are: tpose.\n",
+        )
+        assert command(output, "calibrate", {}) == (422, "No calibration runs. Start one first.\n")
+        assert command(output, "calibrate", {"kind": "tpose"})[0] == 200
+        assert command(output, "calibrate", {"kind": "tpose"}) == (422, "A calibration runs. Stop it first.\n")
+        while not states or states[-1]["stage"] not in ("done", "failed"):
+            states.append(newest(output, "calibration"))
+            numbers.append(newest(output, "frame")["number"])
+        time.sleep(1.0)  # the page gets the frames a moment later
+        stations = newest(output, "frame")["stations"]
+        assert command(output, "calibrate", {"kind": "tpose"})[0] == 200
+        assert command(output, "calibrate", {})[0] == 200
+        while newest(output, "calibration")["stage"] != "failed":
+            time.sleep(0.05)
+        assert newest(output, "calibration")["lines"] == ["stopped before the last pose"]
+    finally:
+        stream.close()
+        session.join()
+    done, posing = states[-1], [state for state in states if state["stage"] == "posing"]
+    assert done["lines"][1].endswith("This session uses it from now on."), done
+    assert posing[0]["number"] == posing[0]["poses"] == 1
+    assert posing[0]["instruction"].startswith("Stand upright, arms straight out")
+    assert len(posing[0]["wanted_mm"]) == 75
+    shares = [state["still_share"] for state in posing]
+    assert shares == sorted(shares)
+    assert max(shares) > 0.5
+    assert numbers[-1] > numbers[0] + 40, "frames go on meanwhile"
+    (path,) = tmp_path.iterdir()
+    kept = read_calibration(path).calibration
+    assert kept.stations == names
+    expected_m = worn.calibration.tracker_origin_m - [0.0, 0.5, 0.0]
+    np.testing.assert_allclose(kept.tracker_origin_m, expected_m, atol=0.03)
+    hand_m = np.array(stations[0][:3]) / 1e3
+    simulated_m = rotations.rotate(kept.world_from_tracker, standing.frames[0].position_m[0]) + kept.tracker_origin_m
+    np.testing.assert_allclose(hand_m, simulated_m, atol=0.01)
 
 
 def test_a_session_whose_page_has_ended_is_told(shown: BrowserOutput, rng: np.random.Generator) -> None:
@@ -129,9 +286,9 @@ def test_closing_ends_the_page_and_the_recording(shown: BrowserOutput, switch: R
         connect(shown).connect()
 
 
-def test_a_folder_that_is_not_there_is_refused(tmp_path: Path, switch: RecordingSwitch) -> None:
-    with pytest.raises(BadFile, match="no folder"):
-        BrowserOutput(SETUP, switch, tmp_path / "none")
+def test_the_folder_of_recordings_is_made(tmp_path: Path, switch: RecordingSwitch) -> None:
+    BrowserOutput(SETUP, SessionControl(switch), tmp_path / "new" / "folder").close()
+    assert (tmp_path / "new" / "folder").is_dir()
 
 
 @pytest.mark.parametrize("unread", [False, True])
@@ -141,7 +298,7 @@ def test_the_page_of_a_killed_session_ends_without_a_word(unread: bool, monkeypa
     context = multiprocessing.get_context("spawn")
     session, pipe = context.Pipe()
     ring = PoseRing(context, 2)
-    ended = Thread(target=_run_process, kwargs={"setup": SETUP, "ring": ring, "pipe": pipe}, daemon=True)
+    ended = Thread(target=_run_process, kwargs={"setup": SETUP, "ring": ring, "folder": ".", "pipe": pipe}, daemon=True)
     if unread:
         ended.start()
         assert session.poll(20.0)  # the address, which the session never reads
@@ -168,7 +325,7 @@ def test_a_viewer_that_fails_after_its_session_was_killed_is_silent(
 
     if module.endswith("browser_view"):
         monkeypatch.setattr("harness.live.browser_process.run_browser", fail)
-        _run_process(setup=None, ring=None, pipe=pipe)  # type: ignore[arg-type]  # `fail` takes anything
+        _run_process(setup=None, ring=None, folder=".", pipe=pipe)  # type: ignore[arg-type]  # `fail` takes anything
     else:
         pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
         monkeypatch.setattr("harness.live.viewer_process.run_viewer", fail)

@@ -177,8 +177,10 @@ def test_nothing_is_written_over_unless_told(tmp_path: Path, rng: np.random.Gene
     output.send(live_pose(configuration(rng)))
     output.close()
     assert path.read_text().startswith("frame,status")
-    with pytest.raises(BadFile, match="cannot be written"):
-        PoseTableOutput(tmp_path / "no" / "folder", BODY.skeleton, ())
+    with pytest.raises(BadFile, match="there is a file, not a folder"):
+        PoseTableOutput(path / "below", BODY.skeleton, ())
+    PoseTableOutput(tmp_path / "new" / "folder", BODY.skeleton, ()).close()
+    assert (tmp_path / "new").is_dir()
 
 
 def test_a_file_is_written_over_by_the_first_pose_not_before(tmp_path: Path, rng: np.random.Generator) -> None:
@@ -222,7 +224,7 @@ def test_what_cannot_take_its_place_leaves_the_old_file(
         output.close()
         assert path.read_text() == "mine"
         assert list(tmp_path.iterdir()) == [path]
-    with pytest.raises(BadFile, match="it is not a regular file"):
+    with pytest.raises(BadFile, match="it is not a file"):
         PoseTableOutput(tmp_path, BODY.skeleton, (), force=True)
 
 

@@ -1,10 +1,14 @@
 """Statistics of the last minute of a live session."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from harness.core.estimate import Status
 from harness.live.live_statistics import SECONDS_KEPT, LiveStatistics
 from harness.stream import TrackerFrame
+from tests.live.posing import frame
 
 
 class Clock:
@@ -42,7 +46,7 @@ def test_a_second_has_its_rate_latency_loss_and_quality() -> None:
     np.testing.assert_allclose(second.loss, [0.0, 0.5], atol=0.02)
     assert "held 2, lost 3, dropped 7, head 80% hand 40%" in statistics.status_line()
     shown = statistics.page_content()
-    assert (shown["silent"], shown["silent_s"], shown["lost"]) == (False, 0.0, [False, False])
+    assert (shown["session"], shown["why"], shown["stations"]) == ("OK", "", ["OK", "HELD"])
     (chart,) = shown["seconds"]
     assert chart == {"rate_hz": 49.95, "p50_ms": 25.5, "p99_ms": 49.51, "loss": 0.25, "quality": [0.8, 0.4]}
 
@@ -50,12 +54,13 @@ def test_a_second_has_its_rate_latency_loss_and_quality() -> None:
 def test_a_lost_station_is_reported_once_and_so_is_its_return() -> None:
     clock = Clock()
     statistics = LiveStatistics(("head", "hand"), clock)
-    said: list[str] = []
+    said, words = list[str](), list[str]()
     for k in range(300):
         clock.now_s += 1 / 64
         add(statistics, [True, not 64 <= k < 192])
         said += [f"{k}: {text}" for text in statistics.update()]
-    assert statistics.page_content()["lost"] == [False, False]
+        words.append(statistics.page_content()["stations"][1])
+    assert words == ["OK"] * 64 + ["HELD"] * 32 + ["LOST"] * 96 + ["OK"] * 108
     assert said == ["96: station hand lost at 1.0 s", "192: station hand back at 3.0 s"]
 
 
@@ -73,7 +78,42 @@ def test_silence_shows_and_is_not_the_fault_of_a_station() -> None:
     assert statistics.update() == []
     assert statistics.status_line() == "no data for 0.7 s"
     shown = statistics.page_content()
-    assert (shown["silent"], shown["silent_s"], shown["lost"]) == (True, 0.7, [True, True])
+    assert (shown["silent"], shown["session"], shown["why"]) == (True, "LOST", "no data for 0.7 s")
+    assert shown["stations"] == ["LOST", "LOST"]
+
+
+@pytest.mark.parametrize(
+    ("status", "word", "why"),
+    [
+        (Status.SOLVED, "OK", "no reading of hand"),
+        (Status.HELD, "HELD", "too few readings: the pose is extrapolated; no reading of hand"),
+        (Status.LOST, "LOST", "fewer than half of the stations have readings; no reading of hand"),
+    ],
+)
+def test_a_session_is_what_its_newest_pose_is(status: Status, word: str, why: str) -> None:
+    clock = Clock()
+    statistics = LiveStatistics(("head", "hand"), clock)
+    shown = statistics.page_content()
+    assert (shown["session"], shown["why"]) == ("LOST", "no pose yet")
+    for _ in range(100):
+        clock.now_s += 0.01
+        add(statistics, [True, False], status)
+        statistics.update()
+    shown = statistics.page_content()
+    assert (shown["session"], shown["why"], shown["stations"]) == (word, why, ["OK", "LOST"])
+
+
+def test_a_station_is_whole_with_all_that_it_delivers() -> None:
+    """A station that never has a position is OK without one; one that had a position and loses it is held."""
+    clock = Clock()
+    statistics = LiveStatistics(("head", "hand"), clock)
+    whole = frame(0.0)
+    turned = replace(whole, position_valid=np.array([True, False]))
+    statistics.add(turned, Status.SOLVED, 0.001)
+    assert statistics.page_content()["stations"] == ["OK", "OK"]
+    statistics.add(whole, Status.SOLVED, 0.001)
+    statistics.add(turned, Status.SOLVED, 0.001)
+    assert statistics.page_content()["stations"] == ["OK", "HELD"]
 
 
 def test_a_minute_is_kept() -> None:

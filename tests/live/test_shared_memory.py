@@ -1,5 +1,6 @@
 """Frames through shared memory: all of them in order, or the newest ones for a slow reader."""
 
+from dataclasses import replace
 from multiprocessing import get_context
 
 import numpy as np
@@ -16,6 +17,7 @@ def test_a_frame_comes_back_as_it_was(rng: np.random.Generator) -> None:
     count, records = ring.read(0)
     assert (count, len(records)) == (0, 0)
     pose = live_pose(qpos, 7, 2.5, KINEMATICS)
+    pose = replace(pose, frame=replace(pose.frame, suspect=np.array([True, False])))
     ring.put(pose)
     count, records = ring.read(0)
     assert count == 1
@@ -23,7 +25,19 @@ def test_a_frame_comes_back_as_it_was(rng: np.random.Generator) -> None:
     np.testing.assert_array_equal(PoseRing.qpos(records)[0], qpos)
     stations = ring.station_columns(records)[0]
     np.testing.assert_array_equal(stations[:, 3:7], pose.frame.tracker_from_station)
-    np.testing.assert_array_equal(stations[:, 7:], np.ones((2, 3)))
+    np.testing.assert_array_equal(stations[:, 7:10], np.ones((2, 3)))
+    assert PoseRing.room(records[0]) is None
+    back = PoseRing.frame(records[0, :4], stations)
+    np.testing.assert_array_equal(back.suspect, pose.frame.suspect)
+
+
+def test_the_room_of_a_frame_comes_with_it(rng: np.random.Generator) -> None:
+    ring = PoseRing(get_context("spawn"), 2)
+    room = np.array([1.0, 2.0, 2.5]), np.array([0.0, 1.0, 0.0, 0.0])
+    ring.put(replace(live_pose(configuration(rng), kinematics=KINEMATICS), room=room))
+    back = PoseRing.room(ring.read(0)[1][0])
+    assert back is not None
+    np.testing.assert_array_equal(np.concatenate(back), np.concatenate(room))
 
 
 def test_a_reader_gets_every_frame_once(rng: np.random.Generator) -> None:

@@ -82,9 +82,6 @@ def test_what_cannot_be_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(sys, "platform", "linux")
     with pytest.raises(BadInput, match="there is no screen"):
         ViewerOutput("window", OWN, force=False)
-    (tmp_path / "file").write_text("")
-    with pytest.raises(BadFile, match="cannot be created"):
-        ViewerOutput("frames", OWN, tmp_path / "file", force=False)
 
 
 def test_the_performer_stands_beside_the_pose(tmp_path: Path) -> None:

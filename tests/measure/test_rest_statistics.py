@@ -1,4 +1,4 @@
-"""The spread at rest by hand; the slope of the mean against dense generalised least squares, and its coverage."""
+"""Distances at rest by hand; the slope of the mean against dense generalised least squares, and its coverage."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from harness.core.arrays import Bools, Floats
 from harness.core.number_format import Interval
 from harness.measure.gauss_markov import NOISE_KEYS
 from harness.measure.noise_fit import NoiseFit
-from harness.measure.rest_statistics import drift_speed, mean_drift, rest_spread
+from harness.measure.rest_statistics import drift_speed, mean_drift, rest_distance
 from harness.measure.static_series import StaticSeries
 from harness.simulate import Noise
 from tests.measure.test_gauss_markov import dense_covariance
@@ -25,20 +25,33 @@ def at_distances(distance: Floats, valid: Bools) -> StaticSeries:
     return StaticSeries("head", 4.0, 0.0, 0.0, place, -2.0 * place, np.ones(rows), valid)
 
 
-def test_the_spread_is_the_root_mean_square_with_the_interval_of_its_blocks() -> None:
-    """Blocks of 10 s with mean squares 1, 1, 4 and 4: 2.5 with a standard error of sqrt(4/3 x 4 x 1.5^2) / 4."""
-    distance, valid = np.repeat([1.0, 1.0, 2.0, 2.0, 9.0], [40, 40, 40, 40, 39]), np.ones(199, bool)
-    found = rest_spread([at_distances(distance, valid)], "position_m")
-    assert found.value == pytest.approx(2.5**0.5)
-    assert (found.low, found.count) == (0.0, 160)
-    assert found.high == pytest.approx(np.sqrt(2.5 + 3.182446 * 12.0**0.5 / 4.0), rel=1e-6)
-    turned = rest_spread([at_distances(distance, valid)], "rotation_rad")
+def test_the_distance_of_half_the_readings_with_the_interval_of_its_blocks() -> None:
+    """Blocks of 10 s with 3/4, 3/4, 1/4 and 1/4 of their readings below: a standard error of 0.144, t of 3.18."""
+    distance = np.concatenate([np.arange(1, 41), np.arange(1, 41), np.arange(21, 61), np.arange(21, 61), [900] * 39])
+    valid = np.ones(199, bool)
+    found = rest_distance([at_distances(0.01 * distance, valid)], "position_m", 0.5)
+    assert found.value == pytest.approx(0.30, abs=0.006)
+    assert (found.low, found.high) == pytest.approx((0.032, 0.568), abs=0.01)
+    assert found.count == 160
+    turned = rest_distance([at_distances(0.01 * distance, valid)], "rotation_rad", 0.5)
     assert (turned.value, turned.high) == pytest.approx((2.0 * found.value, 2.0 * found.high))
-    distance[5:10], valid[5:10] = 50.0, False
-    beside = rest_spread([at_distances(distance, valid)], "position_m")
-    assert beside.value == pytest.approx((395.0 / 155.0) ** 0.5)
-    assert beside.count == 155
-    assert not rest_spread([at_distances(distance[:159], valid[:159])], "position_m").is_measured
+    distance[5:10], valid[5:10] = 900, False
+    assert rest_distance([at_distances(0.01 * distance, valid)], "position_m", 0.5).count == 155
+    assert not rest_distance([at_distances(distance[:159], valid[:159])], "position_m", 0.5).is_measured
+
+
+def test_outliers_do_not_change_the_distance_of_the_others(rng: np.random.Generator) -> None:
+    """Two percent of the readings are 40 times as far as 95 % of the others, as with echoes."""
+    plain = np.abs(rng.normal(scale=1e-3, size=4000))
+    echoes = np.where(np.arange(4000) % 50 == 7, 0.08, plain)
+    half, most = (
+        [rest_distance([at_distances(each, np.ones(4000, bool))], "position_m", share) for each in (plain, echoes)]
+        for share in (0.5, 0.95)
+    )
+    assert half[1].value == pytest.approx(half[0].value, rel=0.04)
+    assert most[1].value == pytest.approx(most[0].value, rel=0.15)
+    assert most[0].value == pytest.approx(1.96e-3, rel=0.1)
+    assert most[0].contains(1.96e-3)
 
 
 def test_the_slope_is_that_of_dense_least_squares() -> None:

@@ -210,12 +210,6 @@ def test_some_subject_must_be_named(tmp_path: Path) -> None:
         fetch_cmu([], tmp_path / "out")
 
 
-def test_a_file_in_the_place_of_the_folder_is_one_clear_line(site: Site, tmp_path: Path) -> None:
-    (tmp_path / "out").write_text("mine")
-    with pytest.raises(BadInput, match="cannot be created"):
-        fetch_cmu(["91"], tmp_path / "out", base_url=site.url)
-
-
 def test_an_unknown_subject_is_one_clear_line(site: Site, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="lists no motions of subject 07"):
         fetch_cmu(["7"], tmp_path / "out", base_url=site.url)

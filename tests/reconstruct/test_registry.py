@@ -1,6 +1,7 @@
 """The registry of methods."""
 
 import math
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib.metadata import EntryPoint
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from harness.core.working_folder import serve_folder
 from harness.errors import BadInput, RenamedKey, UnknownName
 from harness.reconstruct import registry
 from harness.reconstruct.methods.clean_up import CleanUp
@@ -41,12 +43,16 @@ def test_a_class_is_found_by_its_module() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["", "ik:gausian", "ik:", "../x:Class", "mean", "no_such_module:Class", "ik2+ik", ":Class", "+ik"]
+    ("name", "said"),
+    [
+        *((name, "mean_pose") for name in ("", "ik:gausian", "ik:", "mean", "ik2+ik", "+ik")),
+        *((name, "no module for ") for name in ("../x:Class", "no_such_module:Class", ":Class")),
+    ],
 )
-def test_unknown_names_are_refused_with_the_choices(name: str) -> None:
+def test_unknown_names_are_refused_with_the_choices(name: str, said: str) -> None:
     with pytest.raises(UnknownName) as caught:
         registry.make_method(name)
-    assert "mean_pose" in str(caught.value)
+    assert said in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -88,6 +94,30 @@ def test_a_module_without_that_class_and_a_class_that_is_no_method() -> None:
         registry.make_method("harness.reconstruct.methods.mean_pose:MeanPoze")
     with pytest.raises(BadInput, match="no summary"):
         registry.make_method("fractions:Fraction")
+
+
+def test_a_module_that_is_not_found_and_what_a_module_defines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A module of the working folder may have the name of a method."""
+    (tmp_path / "ridge.py").write_text(
+        "import numpy as np\nfrom dataclasses import dataclass\n"
+        "from harness.reconstruct.methods.mean_pose import MeanPose\n"
+        "class Other(MeanPose): ...\nclass Ridge(MeanPose): ...\nclass Helper: ...\n"
+        "def tuned(): return Ridge()\ndef solve(a, b): ...\n"
+    )
+    monkeypatch.setattr("sys.meta_path", [*sys.meta_path])
+    monkeypatch.delitem(sys.modules, "ridge", raising=False)
+    serve_folder(str(tmp_path))
+    with pytest.raises(UnknownName, match="called 'ridg'\\. Did you mean 'ridge'") as error:
+        registry.make_method("ridg:Ridge")
+    assert f"{tmp_path} or the installed packages" in str(error.value)
+    (tmp_path / "mine.py").write_text("")
+    with pytest.raises(UnknownName, match="Did you mean 'mine:CLASS'"):
+        registry.make_method("mine")
+    with pytest.raises(UnknownName, match="Did you mean 'Ridge'") as error:
+        registry.make_method("ridge:Rigde")
+    assert error.value.known == ("Ridge", "Other", "tuned")
+    assert registry.make_method("ridge:Ridge").fit is not None
+    del sys.modules["ridge"]
 
 
 @pytest.mark.parametrize(
@@ -164,8 +194,8 @@ def test_wrong_options_get_a_suggestion(name: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("ik[loss.robust=3]", "expected bool"),
-        ("ik[stopping.most_steps=0.5]", "expected int"),
+        ("ik[loss.robust=3]", "expected true or false"),
+        ("ik[stopping.most_steps=0.5]", "expected a whole number"),
         ("ik[stopping=3]", "expected a table"),
         ("ik[jump_m=nan]", "finite"),
         ("tests.reconstruct.test_registry:Plain[k=3]", "takes no options"),

@@ -102,6 +102,22 @@ def test_a_command_needs_the_token(server: ViewServer) -> None:
         assert other.token != server.token
 
 
+@pytest.mark.parametrize("name", ["Origin", "Sec-Fetch-Site"])
+def test_a_command_from_the_page_of_another_site_is_refused(server: ViewServer, name: str) -> None:
+    """A browser adds these headers by itself; a program without a page has none of them."""
+    host = f"http://127.0.0.1:{server.port}"
+    own = {"Origin": [host, host.replace("127.0.0.1", "localhost")], "Sec-Fetch-Site": ["same-origin"]}
+    others = {
+        "Origin": ["http://evil.example", "null", "", "http://127.0.0.1", host.replace("http", "https"), f"{host}0"],
+        "Sec-Fetch-Site": ["cross-site", "same-site", "none", ""],
+    }
+    for text in own[name]:
+        assert command(server, "double", '{"n": 21}', **{name: text})[0] == 200
+    for text in others[name]:
+        assert command(server, "double", '{"n": 21}', **{name: text})[0] == 403
+    assert ask(server, "/", **{name: others[name][0]})[0] == 200
+
+
 @pytest.mark.parametrize(
     ("name", "body", "status"),
     [

@@ -14,8 +14,7 @@ import numpy as np
 
 from harness.core import files
 from harness.errors import BadFile, BadInput
-from harness.results import BASELINES
-from harness.results.files import insert_digest, read_result_json
+from harness.results.files import BASELINES, insert_digest, read_result_json
 
 SCHEMA = 1
 ANGLE = "joint_angle_mean_deg"

@@ -46,7 +46,7 @@ class ScenarioFile:
             try:
                 scenario = self._build(content)
             except (TypeError, ValueError) as error:
-                raise BadFile(path, str(error), "a scenario", "See the shipped ones in scenarios/.") from error
+                raise BadFile(path, str(error), "", "See the shipped ones in scenarios/.") from error
             check_scenario(path, scenario)
             check_expected_orders(path, scenario)
         return scenario
@@ -125,7 +125,7 @@ def find_config(path: Path | str, kind: str, folder: Path, shipped: Sequence[Pat
     by_name = {file.stem: file for file in shipped}
     if given.suffix in ("", ".toml") and given.stem in by_name and given.parent in (Path(), folder):
         return by_name[given.stem]
-    if given.parent == Path() and not given.suffix:
+    if given.parent == Path() and not given.suffix and not given.is_dir():
         raise UnknownName(kind, str(path), by_name)
     check_input_file(given, f"a {kind} in TOML", MAX_TOML_BYTES, advice)
     return given

@@ -48,7 +48,7 @@ def load_sweep(path: Path | str) -> tuple[Sweep, Path]:
         with name_file(path):
             sweep = build(Sweep, content, "sweep")
     except (TypeError, ValueError) as error:
-        raise BadFile(path, str(error), _EXPECTED, _ADVICE) from error
+        raise BadFile(path, str(error), "", _ADVICE) from error
     if sweep.schema != SCHEMA:
         advice = "This version of the harness reads no other."
         raise BadFile(path, f"schema {sweep.schema}", f"schema {SCHEMA}", advice)

@@ -22,7 +22,7 @@ from harness.measure.noise_spectra import (
 )
 from harness.measure.profile import QualityClass, StretchLength, UnitProfile
 from harness.measure.reports.departures import Departure
-from harness.measure.rest_statistics import drift_speed, mean_drift, rest_spread
+from harness.measure.rest_statistics import drift_speed, mean_drift, rest_distance
 from harness.measure.rigid_pair import RigidPair
 from harness.measure.static_series import StaticSeries
 from harness.measure.unit_file import UnitFile
@@ -153,8 +153,10 @@ class RecordingAdvice:
 
 
 STATION_FIGURES = (
-    "spread_m",
-    "spread_rad",
+    "half_within_m",
+    "most_within_m",
+    "half_within_rad",
+    "most_within_rad",
     "white_m",
     "slow_m",
     "slope_m_min",
@@ -276,8 +278,10 @@ def _figures(profile: UnitProfile, station: str) -> dict[str, Interval]:
     rest = [one for one in profile.rest if one.station == station]
     figures = {name: known[key] for name, key in _STATION_KEYS.items() if key in known}
     return {
-        "spread_m": rest_spread(rest, "position_m"),
-        "spread_rad": rest_spread(rest, "rotation_rad"),
+        "half_within_m": rest_distance(rest, "position_m", 0.5),
+        "most_within_m": rest_distance(rest, "position_m", 0.95),
+        "half_within_rad": rest_distance(rest, "rotation_rad", 0.5),
+        "most_within_rad": rest_distance(rest, "rotation_rad", 0.95),
         "slope_m_min": _slope_m_min(profile, station),
         **figures,
     }

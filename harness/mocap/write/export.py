@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TypeVar
 
-from harness.core.fault_report import is_system_fault
 from harness.core.files import move_into_place, remove_leftovers, temporary_path
 from harness.errors import BadInput, UnknownName
 from harness.mocap.write.body_model import BodyModel, stick_figure
@@ -43,7 +42,7 @@ def export_motion(
     Names are `CLIP-METHOD-INPUTS.truth.*` and `.estimate.*`, or `CLIP-METHOD-INPUTS.glb`. The warm-up seconds, which
     scores leave out, are written too. Either all files are written or none. A cell without a finite estimate is left
     out. `model` gives the surface and the stations of a body for `glb`. Raises UnknownName for another format, and
-    BadInput if a file exists (unless `force`), if the folder cannot be written, and if there is nothing to write.
+    BadInput if a file exists (unless `force`), and if there is nothing to write.
     """
     if fmt not in EXPORT_FORMATS:
         raise UnknownName("export format", fmt, EXPORT_FORMATS)
@@ -65,10 +64,6 @@ def export_motion(
             progress(stem)
         for path, unfinished in ready.items():
             move_into_place(unfinished, path)
-    except OSError as error:
-        if is_system_fault(error):
-            raise
-        raise BadInput(f"{folder} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
     finally:
         for unfinished in folder.glob(temporary_path(folder / "*").name):
             unfinished.unlink()

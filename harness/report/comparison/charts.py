@@ -29,6 +29,7 @@ from harness.report.comparison.wording import (
 from harness.report.kit.axes import draw_interval, label_rows
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Axes, Chart, Figure
+from harness.report.kit.text import truncate
 
 SIZE_IN = (3.3, 2.5)
 WORSE_COLOUR, BETTER_COLOUR = COLOURS[0], COLOURS[1]
@@ -100,7 +101,7 @@ def _draw_differences(axes: Axes, line: Difference, difference: Floats) -> None:
     axes.plot([1.0], [line.difference], "D", color=PAPER, markeredgecolor=INK, markeredgewidth=1.6, markersize=5.5)
     axes.set_xlim(-0.6, 1.65)
     axes.set_xticks([0.0, 1.0], ["clips", f"mean\n{format_signed(line, line.difference)}"])
-    axes.set_title("B − A", fontsize=9, fontweight="normal", pad=3.0)
+    axes.set_title("B − A", fontsize=9.5, fontweight="normal", pad=3.0)
     axes.yaxis.set_major_locator(MaxNLocator(4))
     axes.tick_params(labelsize=9, length=0)
     axes.grid(False)
@@ -149,39 +150,50 @@ _SYMLOG_RATIO = 40.0
 """The axis is symmetrically logarithmic if the longest row reaches this many times as far as the median row."""
 
 
-def interval_charts(comparison: Comparison, gated: bool) -> list[Callable[[], Chart]]:
-    """What draws a chart for each metric of the gated lines, or of the others.
+def interval_charts(
+    comparisons: Sequence[Comparison], gated: bool, *, between_methods: bool = False
+) -> list[Callable[[], Chart]]:
+    """What draws a chart for each metric of the gated lines, or of the others, of one or several comparisons.
 
-    Lines whose mean in A is zero are left out.
+    Lines whose mean in A is zero are left out. Rows of several comparisons have the name of B, `between_methods` alone.
     """
-    chosen = [line for line in comparison.differences if line.gated == gated and line.mean_a]
-    metrics = dict.fromkeys(line.metric for line in chosen)
+    several = len(comparisons) > 1
+    chosen = [
+        (line, [*([each.b] if several else []), *([] if between_methods else [line.method])], groups_vary(each))
+        for each in comparisons
+        for line in each.differences
+        if line.gated == gated and line.mean_a and not (several and line.part)
+    ]
     charts: list[Callable[[], Chart]] = []
-    for number, metric in enumerate(metrics, start=1):
-        lines = [line for line in chosen if line.metric == metric]
+    for number, metric in enumerate(dict.fromkeys(line.metric for line, _, _ in chosen), start=1):
+        lines = [line for line, _, _ in chosen if line.metric == metric]
+        names = [
+            _label([*words, *([line.group] if vary else [])]) for line, words, vary in chosen if line.metric == metric
+        ]
         name = f"intervals_{'gated' if gated else 'other'}_{number}"
-        charts.append(partial(_interval_chart, name, metric, lines, groups_vary(comparison)))
+        reference = comparisons[0].a if several else "A"
+        charts.append(partial(_interval_chart, name, metric, lines, names, reference))
     return charts
 
 
-def _interval_chart(name: str, metric: str, lines: Sequence[Difference], several: bool) -> Chart:
-    names = [_label(line, several) for line in lines]
+def _interval_chart(name: str, metric: str, lines: Sequence[Difference], names: Sequence[str], reference: str) -> Chart:
     texts = [
-        f"{line.method} {format_change_percent(percent_of_a(line, line.difference))} {line.verdict}" for line in lines
+        f"{row.replace(chr(10), ' ')} {format_change_percent(percent_of_a(line, line.difference))} {line.verdict}"
+        for row, line in zip(names, lines, strict=True)
     ]
     height_in = _FRAME_IN + sum(max(_ROW_IN, 0.17 * (1 + name.count("\n"))) for name in names)
     return draw_chart(
         name,
         metric,
         "",
-        f"{metric}, difference in percent of A's mean: {'; '.join(texts)}.",
-        lambda figure: _draw_intervals(figure, lines, names),
+        f"{metric}, difference in percent of {reference}'s mean: {'; '.join(texts)}.",
+        lambda figure: _draw_intervals(figure, lines, names, reference),
         height_in,
         width_in=_WIDTH_IN,
     )
 
 
-def _draw_intervals(figure: Figure, lines: Sequence[Difference], names: Sequence[str]) -> None:
+def _draw_intervals(figure: Figure, lines: Sequence[Difference], names: Sequence[str], reference: str = "A") -> None:
     axes = figure.subplots()
     for row, line in enumerate(lines):
         margin = percent_of_a(line, line.margin)
@@ -194,7 +206,7 @@ def _draw_intervals(figure: Figure, lines: Sequence[Difference], names: Sequence
         )
     axes.axvline(0.0, color=FAINT, linewidth=0.9)
     label_rows(axes, names)
-    axes.set_xlabel("B − A [% of A's mean]")
+    axes.set_xlabel("B − A [% of A's mean]" if reference == "A" else f"change [% of {truncate(reference, _LETTERS)}]")
     _scale(axes, lines)
 
 
@@ -227,8 +239,7 @@ def _extent(line: Difference) -> float:
     return max(abs(value) for value in ends if not math.isnan(value))
 
 
-def _label(line: Difference, several: bool) -> str:
-    words = [line.method, *([line.group] if several else [])]
+def _label(words: Sequence[str]) -> str:
     rows = [row for text in words for row in textwrap.wrap(text, _LETTERS) or [""]]
     shortened = [*rows[: _MOST_ROWS - 1], textwrap.shorten(" ".join(rows[_MOST_ROWS - 1 :]), _LETTERS, placeholder="…")]
     return "\n".join(rows if len(rows) <= _MOST_ROWS else shortened)

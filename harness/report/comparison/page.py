@@ -124,7 +124,7 @@ def comparison_page(comparison: Comparison) -> Page:
             Section("Differences and margins", "intervals", _intervals(comparison)),
             Section("All numbers", "figures", _tables(comparison, lines, rest), "gated"),
             Section("What differs", "differs", _what_differs(comparison)),
-            Section("How verdicts are made", "verdicts", _how(comparison), terminal=False),
+            Section("How verdicts are made", "verdicts", verdict_notes(lines), terminal=False),
         ],
     )
 
@@ -151,7 +151,7 @@ def _panel_heading(line: Difference, several: bool) -> Markup:
 
 
 def _intervals(comparison: Comparison) -> list[Block]:
-    gated, ungated = ([(None, draw) for draw in interval_charts(comparison, kind)] for kind in (True, False))
+    gated, ungated = ([(None, draw) for draw in interval_charts([comparison], kind)] for kind in (True, False))
     rest = [BrowserOnly([Panels(ungated, broad=True)], "Metrics that are not gated")] if ungated else []
     return [BrowserOnly([Prose(_INTERVALS)]), Panels(gated, broad=True), *rest] if gated or ungated else []
 
@@ -252,14 +252,15 @@ def _what_differs(comparison: Comparison) -> list[Block]:
     ]
 
 
-def _how(comparison: Comparison) -> list[Block]:
+def verdict_notes(lines: Sequence[Difference]) -> list[Block]:
+    """How the verdicts of gated lines are made, and the margin of each metric."""
     meanings = [join(verdict_badge(kind, MARKS[kind]), f": {MEANINGS[kind]}.") for kind in KINDS]
-    return [*map(Prose, _VERDICTS), Bullets(meanings), _margins_table(comparison)]
+    return [*map(Prose, _VERDICTS), Bullets(meanings), _margins_table(lines)]
 
 
-def _margins_table(comparison: Comparison) -> DataTable:
+def _margins_table(lines: Sequence[Difference]) -> DataTable:
     """The margin of each gated metric, absolute and relative to A's mean."""
-    lines, rows = [line for line in comparison.differences if line.gated], []
+    rows = []
     for metric in dict.fromkeys(line.metric for line in lines):
         same = [line for line in lines if line.metric == metric]
         ends = [pick(same, key=lambda line: line.margin) for pick in (min, max)]

@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from harness.compare import MARGINS, ClipValues, MethodRanking, Sampling, rank_methods
-from harness.errors import BadInput, NothingMeasured, UnknownName
+from harness.errors import BadFile, BadInput, NothingMeasured, UnknownName
 from harness.report.figures.print_figure import FigureSelection
 from harness.report.kit.error_lines import CONTROL, Highlights, choose_highlights, find_series
 from harness.report.kit.ranking import name_lag
 from harness.report.kit.text import list_first
 from harness.report.run.data import Row, RunData, Trace, last_varied, read_traces, series_name
 from harness.report.run.ranking import UNRANKED_METRICS, RankingGroup, group_values
-from harness.results import PRIMARY_METRIC, Manifest, lag_of, read_summary, varied_text
-from harness.results.files import check_cells, check_folder
+from harness.results import PRIMARY_METRIC, Manifest, lag_of, load_results, read_summary, varied_text
+from harness.results.files import CELLS_FILE, check_cells, check_folder, read_summary_json
 from harness.score import DEFINITIONS
 
 _MOST_NAMED = 6
@@ -105,14 +105,12 @@ class ConditionSet:
 
 
 def read_conditions(folder: Path) -> ConditionSet:
-    """Read the conditions of the run in a folder, in the order of its cells.
+    """Read the conditions of the run or baseline in a folder, in the order of its cells.
 
     BadFile when it holds no finished run or a damaged one, NothingMeasured when no cell has a joint-angle error.
     """
-    check_folder(folder)
-    summary = read_summary(folder)
+    summary = _baseline_summary(folder) if (folder / CELLS_FILE).exists() else _run_summary(folder)
     cells: Sequence[Row] = summary["cells"]
-    check_cells(folder, cells)
     if all(row[PRIMARY_METRIC] is None for row in cells):
         raise NothingMeasured(folder, len(summary["failures"]))
     keys = list[tuple[Mapping[str, Any], RankingGroup]]()
@@ -124,6 +122,27 @@ def read_conditions(folder: Path) -> ConditionSet:
     keys.sort(key=lambda key: key[1].lag_frames)
     conditions = (_condition(*key, several, summary) for key in keys)
     return ConditionSet(folder, tuple(conditions), summary["cells_finished"], summary["cells_planned"])
+
+
+def _run_summary(folder: Path) -> dict[str, Any]:
+    check_folder(folder)
+    summary = read_summary(folder)
+    check_cells(folder, summary["cells"])
+    return summary
+
+
+def _baseline_summary(folder: Path) -> dict[str, Any]:
+    """The summary of the run that a baseline was saved from, with the metrics that a baseline keeps."""
+    results = load_results(folder)
+    summary = read_summary_json(folder)
+    if "methods" not in summary:
+        raise BadFile(folder, "a baseline of a sweep", "a baseline of a run", "`harness compare` reads it.")
+    missing = dict.fromkeys(DEFINITIONS)
+    cells = [
+        {**missing, **vars(cell), **cell.metrics, "lag": lag_of(cell.defined_by), "key": at}
+        for at, cell in enumerate(results.cells)
+    ]
+    return {**summary, **vars(results.manifest), "cells": cells, "failures": {}}
 
 
 def _condition(

@@ -1,4 +1,4 @@
-"""The table of a run for a paper: the mean of each metric with its interval, by condition and method."""
+"""The table of results for a paper: the mean of each metric with its interval, by condition and method."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from harness.errors import UnknownName
 from harness.report.figures.conditions import RANKING_METRICS, ConditionSet, RunCondition, read_conditions
 from harness.report.kit.ranking import LAG_COLUMN
 from harness.results import PRIMARY_METRIC, SECONDARY_METRIC, varied_text
-from harness.results.files import require_kind
+from harness.results.files import find_results, require_kind
 from harness.score import DEFINITIONS
 
 Standing = Literal["lowest", "tied", "worse", ""]
@@ -83,6 +83,23 @@ class ResultsTable:
     note: str
     """Sentences that explain the values."""
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns of values."""
+        return self.metrics
+
+
+@dataclass(frozen=True)
+class SideBySideTable(ResultsTable):
+    """A table of several results: a column for each of them, a row for each metric of a method in a condition."""
+
+    results: tuple[str, ...] = ()
+    """Names of the results. The first text of the condition of a row is its metric."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        return self.results
+
 
 def build_table(
     folder: Path,
@@ -92,16 +109,16 @@ def build_table(
     condition: str = "",
     by_behaviour: bool = False,
 ) -> ResultsTable:
-    """The table of the run in `folder`; behaviours are pooled unless `by_behaviour`.
+    """The table of the run or baseline in `folder`; behaviours are pooled unless `by_behaviour`.
 
     A value is bold by the ranking that the terminal and the page use (`rank_methods`). UnknownName for a metric,
-    method or condition that does not exist, BadInput for a folder that holds no run, BadFile for a damaged one,
-    NothingMeasured for one without a measured cell.
+    method or condition that does not exist, BadFile for a folder that holds neither a run nor a baseline or a damaged
+    one, NothingMeasured for one without a measured cell.
     """
     for metric in metrics:
         if metric not in DEFINITIONS:
             raise UnknownName("metric", metric, DEFINITIONS)
-    require_kind(folder, "run")
+    require_kind(folder, "run", "baseline")
     run = read_conditions(folder).select(condition, methods)
     names = _condition_names(run, by_behaviour)
     rows, few = [], False
@@ -121,6 +138,41 @@ def build_table(
                 if series in values
             ]
     return ResultsTable(names, tuple(metrics), tuple(rows), _note(run, rows, few))
+
+
+def build_side_by_side_table(
+    sides: Sequence[tuple[str, Path | str]],
+    metrics: Sequence[str] = DEFAULT_METRICS,
+    *,
+    methods: Sequence[str] = (),
+    condition: str = "",
+    by_behaviour: bool = False,
+) -> SideBySideTable:
+    """The table of several named results, which are folders of runs and baselines, or names of baselines.
+
+    Values are those that the table of each result has, over its own clips. Raises what `build_table` raises.
+    """
+    tables = [
+        build_table(find_results(where), metrics, methods=methods, condition=condition, by_behaviour=by_behaviour)
+        for _, where in sides
+    ]
+    names = tuple(dict.fromkeys(name for table in tables for name in table.condition_names))
+    by_key: dict[tuple[tuple[str, ...], str], list[ResultsRow | None]] = {}
+    for at, table in enumerate(tables):
+        for row in table.rows:
+            texts = dict(zip(table.condition_names, row.condition, strict=True))
+            key = tuple(texts.get(name, "") for name in names), row.method
+            by_key.setdefault(key, [None] * len(tables))[at] = row
+    rows = tuple(
+        ResultsRow(
+            (metric, *texts), method, tuple(row.values[n] if row else MetricValue(metric, None) for row in of_results)
+        )
+        for n, metric in enumerate(metrics)
+        for (texts, method), of_results in by_key.items()
+    )
+    notes = dict.fromkeys(table.note for table in tables if table.note)
+    note = " ".join(["Each result is averaged and ranked on its own clips; harness compare pairs them.", *notes])
+    return SideBySideTable(("metric", *names), tuple(metrics), rows, note, tuple(name for name, _ in sides))
 
 
 def _condition_names(run: ConditionSet, by_behaviour: bool) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 from harness.core.csv_text import csv_line
 from harness.errors import UnknownName
-from harness.report.figures.table import MetricValue, ResultsTable
+from harness.report.figures.table import MetricValue, ResultsRow, ResultsTable, SideBySideTable
 from harness.report.kit.text import metric_label
 
 _LATEX = {
@@ -26,7 +26,7 @@ _LATEX = {
 
 def to_latex(table: ResultsTable) -> str:
     """A tabular environment with booktabs rules; a condition is named in its first row, and space precedes it."""
-    columns = "l" * (len(table.condition_names) + 1) + "r" * (len(table.metrics) + 1)
+    columns = "l" * (len(table.condition_names) + 1) + "r" * (len(table.columns) + 1)
     lines = [
         r"% needs \usepackage{booktabs}",
         f"% {table.note}",
@@ -39,7 +39,8 @@ def to_latex(table: ResultsTable) -> str:
     for row in table.rows:
         if before is not None and row.condition != before:
             lines.append(r"\addlinespace")
-        condition = [""] * len(row.condition) if row.condition == before else map(_escape_latex, row.condition)
+        texts = _condition_texts(table, row)
+        condition = [""] * len(texts) if row.condition == before else map(_escape_latex, texts)
         values = [_latex_value(value) for value in row.values]
         lines.append(_latex_row([*condition, _escape_latex(row.method), str(row.clips), *values]))
         before = row.condition
@@ -67,7 +68,7 @@ def to_markdown(table: ResultsTable) -> str:
     rules = ["---" if n < texts else "--:" for n in range(len(titles))]
     names = [markdown_code(row.method) for row in table.rows]
     rows = [
-        [*map(_escape_markdown, row.condition), name, str(row.clips), *map(_markdown_value, row.values)]
+        [*map(_escape_markdown, _condition_texts(table, row)), name, str(row.clips), *map(_markdown_value, row.values)]
         for name, row in zip(names, table.rows, strict=True)
     ]
     lines = [f"| {' | '.join(cells)} |" for cells in (map(_escape_markdown, titles), rules, *rows)]
@@ -92,12 +93,12 @@ def _escape_markdown(text: str) -> str:
 
 
 def to_csv(table: ResultsTable) -> str:
-    """A line for each row; a metric has the columns NAME, NAME.low, NAME.high, NAME.clips and NAME.standing.
+    """A line for each row; a metric, or each of several results, has NAME, NAME.low, .high, .clips and .standing.
 
     Fields are empty where nothing was measured or ranked. Numbers have nine digits.
     """
     parts = ("", ".low", ".high", ".clips", ".standing")
-    head = csv_line([*table.condition_names, "method", *(f"{name}{part}" for name in table.metrics for part in parts)])
+    head = csv_line([*table.condition_names, "method", *(f"{name}{part}" for name in table.columns for part in parts)])
     fields = ([field for value in row.values for field in _csv_fields(value)] for row in table.rows)
     rows = (csv_line([*row.condition, row.method, *of]) for row, of in zip(table.rows, fields, strict=True))
     return "".join([head, *rows])
@@ -109,7 +110,14 @@ def _csv_fields(value: MetricValue) -> list[str]:
 
 
 def _titles(table: ResultsTable) -> list[str]:
-    return [*table.condition_names, "method", "clips", *map(metric_label, table.metrics)]
+    names = table.columns if isinstance(table, SideBySideTable) else map(metric_label, table.columns)
+    return [*table.condition_names, "method", "clips", *names]
+
+
+def _condition_texts(table: ResultsTable, row: ResultsRow) -> list[str]:
+    """The condition of a row, with the label of a metric."""
+    metrics = row.condition[: isinstance(table, SideBySideTable)]
+    return [*map(metric_label, metrics), *row.condition[len(metrics) :]]
 
 
 TABLE_FORMATS: dict[str, Callable[[ResultsTable], str]] = {"latex": to_latex, "markdown": to_markdown, "csv": to_csv}

@@ -4,14 +4,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from harness.core.fault_report import is_system_fault
-from harness.core.files import write_bytes
+from harness.core.files import require_writable, write_output
 from harness.errors import BadInput, UnknownName
 from harness.report.figures.conditions import ConditionSet, read_conditions
 from harness.report.figures.frame_figures import distribution_figure, over_time_figure
 from harness.report.figures.mean_figures import joints_figure, ranking_figure
 from harness.report.figures.print_figure import FigureSelection, PrintFigure, draw_figure
-from harness.report.figures.table import DEFAULT_METRICS, ResultsTable, build_table
+from harness.report.figures.table import DEFAULT_METRICS, ResultsTable, build_side_by_side_table, build_table
 from harness.report.figures.table_formats import format_table
 from harness.report.placement.pareto import placement_figure
 from harness.results.files import require_kind
@@ -30,6 +29,7 @@ class FigureKind:
     """Plans the figure of a run; None for that of a placement study."""
 
 
+_WHAT = "a figure or a table"
 _RANKING = "mean error of each method with its interval, and the difference to the lowest"
 _TIME = "error over time on one clip: the leader and a control in colour, the others grey"
 _CHOICES = ("methods", "condition")
@@ -104,13 +104,13 @@ def write_figure(
     """
     fmt = (out.suffix.lower().removeprefix(".") if out else "") or "pdf"
     if out is not None:
-        _check_output(out, force)
+        require_writable(out, _WHAT, force=force)
     kind, figure = plan_figure(folder, kind, selection or FigureSelection())
     path = out or folder / FOLDER / f"{figure.name}.{fmt}"
-    _check_output(path, force)
+    require_writable(path, _WHAT, force=force)
     width_mm = width_mm or KINDS[kind].width_mm
     data, height_mm = draw_figure(figure, fmt, width_mm)
-    _write_output(path, data)
+    write_output(path, data, _WHAT, force=force)
     return WrittenFigure(path, kind, float(width_mm), height_mm, figure.caption)
 
 
@@ -123,7 +123,7 @@ class FormattedTable:
 
 
 def write_results_table(
-    folder: Path,
+    results: Path | Sequence[tuple[str, Path | str]],
     fmt: str,
     *,
     metrics: Sequence[str] = DEFAULT_METRICS,
@@ -133,33 +133,18 @@ def write_results_table(
     out: Path | None = None,
     force: bool = False,
 ) -> FormattedTable:
-    """The table of the run in `folder` (see `build_table`) in one of TABLE_FORMATS; it is written to `out`, if given.
+    """The table of results in one of TABLE_FORMATS; it is written to `out`, if given.
+
+    `results` are the folder of a run or baseline (see `build_table`), or the names and folders of several (see
+    `build_side_by_side_table`).
 
     UnknownName for another format; BadInput for a file that exists (unless `force`) or cannot be written.
     """
     if out is not None:
-        _check_output(out, force)
-    table = build_table(folder, metrics, methods=methods, condition=condition, by_behaviour=by_behaviour)
+        require_writable(out, _WHAT, force=force)
+    build: Callable[..., ResultsTable] = build_table if isinstance(results, Path) else build_side_by_side_table
+    table = build(results, metrics, methods=methods, condition=condition, by_behaviour=by_behaviour)
     text = format_table(table, fmt)
     if out is not None:
-        _write_output(out, text.encode())
+        write_output(out, text, _WHAT, force=force)
     return FormattedTable(table, text)
-
-
-def _check_output(path: Path, force: bool) -> None:
-    """BadInput when a file exists that is not to be replaced, or a folder has its name."""
-    if path.is_dir():
-        raise BadInput(f"{path} is a folder.", "Name a file with --out.")
-    if path.exists() and not force:
-        raise BadInput(f"{path} exists.", "Name another file with --out, or replace it with --force.")
-
-
-def _write_output(path: Path, data: bytes) -> None:
-    """Write a file atomically and create its folder; BadInput when its place cannot be written."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(path, data)
-    except OSError as error:
-        if is_system_fault(error):
-            raise
-        raise BadInput(f"{path} cannot be written ({error.strerror}).", "Name another file with --out.") from error

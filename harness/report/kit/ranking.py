@@ -125,7 +125,7 @@ def explain_marks(panels: Sequence[RankingPanel]) -> str:
     sentences = ["Lines: 95 % intervals over units."] if any(len(panel.ranking.units) > 1 for panel in panels) else []
     if any(panel.ranking.results for panel in panels):
         sentences += [
-            "Right: paired difference to the method with the lowest mean.",
+            "Right: paired difference to the method with the lowest mean; thin: corrected for all lines tested.",
             "Tied: no significant difference that exceeds the margin (sign-flip test over units, Holm's correction).",
         ]
     if any(mean > largest_drawn(panels) for panel in panels for mean in panel.ranking.means.values()):
@@ -225,6 +225,8 @@ def _draw_differences(axes: Axes, ranking: MethodRanking, places: Sequence[float
             continue
         if result.low is not None and result.high is not None:  # of the lowest against the other: the sign is turned
             axes.hlines(y, -result.high, -result.low, color=style["color"], linewidth=_LINE * mark_scale())
+        if name in ranking.simultaneous:
+            axes.hlines(y, *ranking.simultaneous[name], color=style["color"], linewidth=0.4 * _LINE * mark_scale())
         _draw_dot(axes, difference, y, style)
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)  # the line at zero stands for it

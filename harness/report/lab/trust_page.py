@@ -71,7 +71,6 @@ def trust_page(found: TrustFindings, command: str) -> Page:
         headline=verdict_sentence(found),
         lead=[
             *([Prose(_EXPLORATORY, is_warning=True)] if found.exploratory else []),
-            *([Prose(f"{found.why[0].upper()}{found.why[1:].rstrip('.')}.")] if found.why else []),
             *([Tally(count_pairs(found.pairs), _PAIR_MARKS, _PAIR_MEANINGS)] if found.pairs else []),
         ],
         facts={
@@ -102,14 +101,14 @@ def trust_page(found: TrustFindings, command: str) -> Page:
 
 
 def verdict_sentence(findings: TrustFindings) -> str:
-    """The verdict in one sentence."""
+    """The verdict and its reason in one sentence."""
     pairs = count_pairs(findings.pairs)
     counted = f"{count_noun(len(findings.pairs), 'pair')} of methods on {count_noun(len(clips(findings)), 'clip')}"
     if (units := max((pair.clips for pair in findings.pairs), default=0)) < len(clips(findings)):
         counted += f" ({count_noun(units, 'unit')} of statistics)"
     match findings.outcome:
         case Outcome.PASS:
-            return f"The simulation ranks methods as the device does: of {counted}, none contradicts."
+            return f"The simulation ranks methods as the device does ({counted}): {findings.why}"
         case Outcome.REGRESSED:
             return f"The simulation {_what_differs(findings)}."
         case Outcome.INCOMPLETE:
@@ -120,7 +119,7 @@ def verdict_sentence(findings: TrustFindings) -> str:
         case _:
             undecided = pairs["cannot tell"]
             rest = f"{undecided} of {counted} {'is' if undecided == 1 else 'are'} undecided"
-            return f"It cannot be told whether the simulation ranks methods as the device does: {rest}."
+            return f"It cannot be told whether the simulation ranks methods as the device does ({rest}): {findings.why}"
 
 
 def _what_differs(findings: TrustFindings) -> str:

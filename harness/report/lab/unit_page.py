@@ -37,8 +37,8 @@ _INTERVALS = (
     "independent samples."
 )
 _STATIONS = (
-    "Spread: standard deviation at rest, of the position in space and of the orientation. White noise and drift are "
-    "its parts on each axis. Lost readings have quality 0; lost records never came. Below: 95 % intervals."
+    "Within: distance at rest from the median position and the mean orientation. White noise and drift are "
+    "standard deviations on each axis. Lost readings have quality 0; lost records never came. Below: 95 % intervals."
 )
 _EPISODES = "Excursion: a displacement of seconds. Echo: a burst of outliers. Gap: a loss."
 
@@ -123,17 +123,20 @@ def description(report: UnitReport) -> list[str]:
 
 
 def _spread_sentence(report: UnitReport) -> str:
-    spreads = {
-        name: [found for row in report.stations if (found := row.figures.get(name)) and found.is_measured]
-        for name in ("spread_m", "spread_rad")
-    }
+    """Half and 95 % of the readings at rest, over all stations; the next sentences name the outliers."""
     parts = [
-        f"{noun} scatters by {format_range(shown.factor * one.value for one in numbers)} {shown.unit}"
-        for (name, numbers), noun in zip(spreads.items(), ("a position", "an orientation"), strict=True)
-        for shown in [find_quantity(f"station.{name}")]
-        if numbers
+        f"half of a station's {noun} lie within {half} of the middle, 95 % in {_over_stations(report, f'most_{end}')}"
+        for noun, end in (("positions", "within_m"), ("orientations", "within_rad"))
+        if (half := _over_stations(report, f"half_{end}"))
     ]
-    return f"At rest, {' and '.join(parts)} (RMS, everything included)." if parts else ""
+    return f"At rest, {'; '.join(parts)}." if parts else ""
+
+
+def _over_stations(report: UnitReport, name: str) -> str:
+    """The smallest and the largest value of a figure; "" where it was not measured."""
+    found = [number.value for row in report.stations if (number := row.figures.get(name)) and number.is_measured]
+    shown = find_quantity(f"station.{name}")
+    return f"{format_range(shown.factor * value for value in found)} {shown.unit}" if found else ""
 
 
 def _noise_sentence(values: Mapping[str, Interval]) -> str:

@@ -14,7 +14,15 @@ if TYPE_CHECKING:
         write_record,
         write_result_json,
     )
-    from harness.results.files.folder_kind import CELLS_FILE, FINDINGS, folder_lock, is_running, require_kind
+    from harness.results.files.folder_kind import (
+        BASELINES,
+        CELLS_FILE,
+        FINDINGS,
+        find_results,
+        folder_lock,
+        is_running,
+        require_kind,
+    )
     from harness.results.files.integrity import (
         SUMMARY,
         check_cells,
@@ -28,6 +36,7 @@ else:
     __getattr__, __dir__ = lazy_names(__name__)
 
 __all__ = [
+    "BASELINES",
     "CELLS_FILE",
     "FINDINGS",
     "SUMMARY",
@@ -38,6 +47,7 @@ __all__ = [
     "check_row",
     "compute_digests",
     "file_digest",
+    "find_results",
     "folder_lock",
     "insert_digest",
     "is_running",

@@ -14,6 +14,8 @@ from harness.errors import BadFile, BadInput
 from harness.results.files.digests import STUDY_FILE
 from harness.results.index import INDEX_FILE, CellIndex
 
+BASELINES = Path("results/baselines")
+"""Folder of baselines that commands find by name."""
 CELLS_FILE = "cells.json"
 """File of a baseline (see `compare.baseline.write_baseline`)."""
 FINDINGS = "findings.json"
@@ -30,6 +32,12 @@ _KINDS = {
     "": ("no results of the harness", "Name the folder that `harness run` or another verb was given as --out."),
 }
 """Kind -> what it is called, and what shows it."""
+
+
+def find_results(where: Path | str) -> Path:
+    """The folder of that name, or of the baseline of that name where no such folder exists."""
+    baseline = BASELINES / where
+    return baseline if not Path(where).exists() and (baseline / CELLS_FILE).is_file() else Path(where)
 
 
 def folder_kind(out: Path) -> str:

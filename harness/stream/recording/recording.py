@@ -109,9 +109,11 @@ class Recording:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """Events on the line: kind, text and time on the host's clock [s]."""
+        """Events on the line: kind, text, time on the host's clock [s] and time since the first block [s]."""
         event_blocks = [block for block in self.blocks() if block.kind == EVENT]
-        return [{"monotonic_s": block.monotonic_s, **self._event(block)} for block in event_blocks]
+        first_s = next(iter(self.blocks())).monotonic_s if event_blocks else 0.0
+        times = [{"monotonic_s": block.monotonic_s, "elapsed_s": block.monotonic_s - first_s} for block in event_blocks]
+        return [{**at, **self._event(block)} for at, block in zip(times, event_blocks, strict=True)]
 
     @property
     def marks(self) -> list[dict[str, Any]]:
@@ -210,16 +212,21 @@ def _whole_blocks(file: BinaryIO) -> Iterator[RecordingBlock]:
 
 
 def describe_damage(entries: Iterable[RecordingBlock | DamagedSpan], damage: list[str]) -> Iterator[RecordingBlock]:
-    """Yield the whole blocks, and append a description of each damaged part between them to `damage`."""
+    """Yield the whole blocks, and append a description of each damaged part between them to `damage`.
+
+    Its times count from the first whole block.
+    """
     damaged: DamagedSpan | None = None
-    before_s = None
+    first_s = before_s = None
     for entry in entries:
         if isinstance(entry, DamagedSpan):
             damaged = entry
             continue
+        first_s = entry.monotonic_s if first_s is None else first_s
+        now_s = entry.monotonic_s - first_s
         if damaged:
-            damage.append(_damage_text(damaged, before_s, entry.monotonic_s))
-        damaged, before_s = None, entry.monotonic_s
+            damage.append(_damage_text(damaged, before_s, now_s))
+        damaged, before_s = None, now_s
         yield entry
     if damaged:
         damage.append(_truncation_text(damaged, before_s))
@@ -507,10 +514,10 @@ def _file_error(path: Path, error: OSError) -> BadFile:
 def _damage_text(span: DamagedSpan, before_s: float | None, after_s: float) -> str:
     what = f"bytes {span.begin} to {span.end} are damaged"
     if before_s is None:
-        return f"{what}: from the beginning to {after_s:.3f} s of the host's clock"
-    return f"{what}: between {before_s:.3f} s and {after_s:.3f} s of the host's clock"
+        return f"{what}: the beginning; times count from the first whole block"
+    return f"{what}: between {before_s:.3f} s and {after_s:.3f} s"
 
 
 def _truncation_text(span: DamagedSpan, before_s: float | None) -> str:
-    when = "" if before_s is None else f", from {before_s:.3f} s of the host's clock on"
+    when = "" if before_s is None else f", from {before_s:.3f} s on"
     return f"the last {span.end - span.begin} bytes are cut off{when}"

@@ -180,7 +180,7 @@ def load_placement_study(path: Path | str) -> PlacementStudy:
             study = build(PlacementStudy, content, "study")
             study = replace(study, methods=tuple(name for text in study.methods for name in expand_alternatives(text)))
         except (TypeError, ValueError) as error:
-            raise BadFile(path, str(error), expected, advice) from error
+            raise BadFile(path, str(error), "", advice) from error
         if fault := _find_fault(study):
             raise BadFile(path, *fault)
         _check_names(study)

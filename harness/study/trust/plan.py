@@ -89,7 +89,7 @@ def load_plan(path: Path) -> Plan:
             plan = replace(plan, stations={name: _in_order(scenario, stations) for name, stations in sets.items()})
             parameter_variants(plan, scenario)
         except (TypeError, ValueError) as error:
-            raise BadFile(path, str(error), _EXPECTED, _ADVICE) from error
+            raise BadFile(path, str(error), "", _ADVICE) from error
     return plan
 
 

@@ -242,5 +242,5 @@ def test_a_mean_of_zero_has_no_share(tmp_path: Path) -> None:
 def test_the_same_comparison_gives_the_same_bytes() -> None:
     one = compared({"local_pca": 0.05}, 8)
     assert slope_chart(one.differences[0], 1) == slope_chart(one.differences[0], 1)
-    first, again = (draw() for _ in range(2) for draw in interval_charts(one, True))
+    first, again = (draw() for _ in range(2) for draw in interval_charts([one], True))
     assert first == again

@@ -77,14 +77,14 @@ def test_nothing_is_written_over(ranked: Path, tmp_path: Path) -> None:
         (tmp_path / "x.tex", lambda **options: write_results_table(ranked, "latex", out=tmp_path / "x.tex", **options)),
     ):
         path.write_text("mine")
-        with pytest.raises(BadInput, match="exists"):
+        with pytest.raises(BadFile, match="it exists"):
             write()
         assert path.read_text() == "mine"
         write(force=True)
         assert path.read_bytes() != b"mine"
-        with pytest.raises(BadInput, match="is a folder"):
+        with pytest.raises(BadFile, match="it is not a file"):
             write_figure(ranked, out=tmp_path)
-    with pytest.raises(BadInput, match="cannot be written"):
+    with pytest.raises(BadFile, match=r"x.pdf is a file, not a folder"):
         write_figure(ranked, out=tmp_path / "x.pdf" / "below.pdf")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["x.pdf", "x.tex"]
 

@@ -23,7 +23,7 @@ from harness.report.kit.ranking import RankingPanel, explain_marks, wrap_name
 def test_a_method_that_errs_several_times_as_much_does_not_squeeze_the_others(means: list[float], inside: int) -> None:
     values = {f"m{n}": np.full(8, mean) for n, mean in enumerate(means)}
     panel = RankingPanel(
-        "", MethodRanking("joint_angle_mean_deg", tuple("abcdefgh"), tuple("abcdefgh"), values, {}, {})
+        "", MethodRanking("joint_angle_mean_deg", tuple("abcdefgh"), tuple("abcdefgh"), values, {}, {}, {})
     )
     assert panel.largest_drawn == means[inside - 1]
     assert ("beyond the axis" in explain_marks([panel])) == (inside < len(means))

@@ -44,12 +44,11 @@ def page(tmp_path_factory: pytest.TempPathFactory, trust_findings: TrustFindings
 def test_the_verdict_is_the_first_thing(page: Path, trust_findings: TrustFindings) -> None:
     text = text_of(page)
     assert trust_findings.outcome is Outcome.REGRESSED
-    why = f"{trust_findings.why[0].upper()}{trust_findings.why[1:].rstrip('.')}."
     counts = [
         f"{count} {mark} {kind} "
         for mark, (kind, count) in zip("✗?✓", count_pairs(trust_findings.pairs).items(), strict=True)
     ]
-    assert numbers_in_order(text, "Contradicted", verdict_sentence(trust_findings), why, *counts)
+    assert numbers_in_order(text, "Contradicted", verdict_sentence(trust_findings), *counts)
     assert f"digest {trust_findings.plan_digest[:12]}" in text
     assert "noise default" in text
     assert "Exploratory" not in text
@@ -72,9 +71,12 @@ def test_each_outcome_has_its_figures(trust_findings: TrustFindings, empty: Trus
         (found, (margins,)),
         (turned, (f"1 of 3 pairs of methods ({pair.a} against {pair.b})", margins)),
         (replace(turned, equivalences=()), ("1 of 3 pairs",)),
-        (replace(found, outcome=Outcome.PASS), ("of 3 pairs of methods on 6 clips, none",)),
+        (replace(found, outcome=Outcome.PASS, why="all agree."), ("does (3 pairs of methods on 6 clips): all agree.",)),
         (replace(found, outcome=Outcome.INCOMPLETE, failures=FAILED), ("incomplete: 1 cell failed (ik on walking)",)),
-        (replace(found, outcome=Outcome.NOT_COMPARABLE), ("cannot be told", "2 of 3 pairs of methods on 6 clips")),
+        (
+            replace(found, outcome=Outcome.NOT_COMPARABLE, why="too few units."),
+            ("cannot be told", "(2 of 3 pairs of methods on 6 clips are undecided): too few units."),
+        ),
         (empty, ("cannot be told", "nothing was compared")),
     ):
         assert [text for text in figures if text not in verdict_sentence(findings)] == []
