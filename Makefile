@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-long test-slow mutants gate lint docs compiled clean
+.PHONY: demo test test-long test-slow mutants gate lint docs gallery compiled clean
 
 demo: compiled
 	$(BIN)/harness demo
@@ -35,7 +35,11 @@ lint: $(VENV)/.dev
 
 # The site of docs/ with the API reference, in build/site. A broken link is an error.
 docs: $(VENV)/.dev
-	$(BIN)/mkdocs build --strict --quiet
+	$(BIN)/mkdocs build --strict
+
+# The studies of docs/gallery.md, in build/gallery, and their pictures and results in docs.
+gallery: compiled $(VENV)/.dev
+	$(BIN)/python -m tests.gallery
 
 # Exact versions come from requirements.lock, the ranges from pyproject.toml.
 $(VENV)/.ready: pyproject.toml requirements.lock

@@ -15,8 +15,8 @@ from tests.test_prose import ROOT
 
 
 def build(root: Path, out: Path) -> subprocess.CompletedProcess[str]:
-    """As `make docs` does, of another folder with the documents and the package."""
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(out)]
+    """As `make docs` does, which hides no warning with --quiet, of another folder with the documents and the package."""
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(out)]
     return subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=900, check=False)
 
 

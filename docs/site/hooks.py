@@ -19,6 +19,10 @@ PAGES_OUTSIDE = {"readme.md": "README.md", "contributing.md": "CONTRIBUTING.md",
 """Page of the site -> file of the repository."""
 CODE_STYLES = {"css/code_light.css": "xcode", "css/code_dark.css": "github-dark"}
 """Style sheet of the site -> its style of Pygments."""
+STUDIES = ROOT / "build" / "gallery"
+"""Pages that `make gallery` made, if it did."""
+RESULT = re.compile(r"^<!-- result (\S+) -->$", re.MULTILINE)
+"""Beginning of the result of a study in docs/gallery.md, with its page."""
 LINK = re.compile(r'(!?)\[([^\[\]]*)\]\(([^)\s]+)\)|src="([^"]+)"')
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\(\(|\[)(.*?)\\[)\]]</\1>', re.DOTALL)
 """What the extension `pymdownx.arithmatex` makes of $...$ and of $$...$$."""
@@ -31,7 +35,14 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, uri, content=(ROOT / source).read_text(encoding="utf-8")))
     for uri, style in CODE_STYLES.items():
         files.append(File.generated(config, uri, content=HtmlFormatter(style=style).get_style_defs(".highlight")))
+    for name in RESULT.findall((ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")):
+        if (page := STUDIES / name).exists():
+            files.append(File.generated(config, _study_uri(name), abs_src_path=str(page)))
     return files
+
+
+def _study_uri(name: str) -> str:
+    return f"gallery/{name.replace('/', '_')}"
 
 
 def on_page_markdown(markdown: str, page: Page, files: Files, **_: object) -> str:
@@ -56,7 +67,11 @@ def on_page_markdown(markdown: str, page: Page, files: Files, **_: object) -> st
         target = posixpath.relpath(uri, posixpath.dirname(here) or ".") + mark + anchor
         return f'src="{target}"' if targets[1] else f"{picture}[{text}]({target})"
 
-    return LINK.sub(move, markdown)
+    return LINK.sub(move, RESULT.sub(_study_link, markdown))
+
+
+def _study_link(found: re.Match[str]) -> str:
+    return f"[The page of the study]({_study_uri(found[1])}).\n" if (STUDIES / found[1]).exists() else found[0]
 
 
 def on_page_content(html_text: str, page: Page, **_: object) -> str:
