@@ -109,7 +109,7 @@ def _calibrate(calibration: PageCalibration, wanted: Mapping[str, Any]) -> Mappi
 
 
 def _frame(setup: SessionSetup, record: Floats, stations: Floats) -> dict[str, Any]:
-    """A frame for the page: joints [mm], status, and of each station its pose."""
+    """A frame for the page: joints [mm], and of each station its pose."""
     room, poses = PoseRing.room(record[0]), list[list[int] | None]()
     for columns in stations:
         poses.append(None)
@@ -119,7 +119,6 @@ def _frame(setup: SessionSetup, record: Floats, stations: Floats) -> dict[str, A
             poses[-1] = np.rint(1e3 * np.concatenate([at_m, turn])).astype(int).tolist()
     return {
         "number": int(record[0, 0]),
-        "status": int(record[0, 3]),
         "joints_mm": joints_mm(setup.skeleton, PoseRing.qpos(record)[0]),
         "stations": poses,
     }

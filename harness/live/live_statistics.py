@@ -151,7 +151,7 @@ class LiveStatistics:
         elif missing:
             why = f"{why}{'; ' if why else ''}no reading of {', '.join(missing)}"
         seconds = [one.page_content() for one in self._summaries]
-        return {"seconds": seconds, "silent": silent, "session": word, "why": why, "stations": stations}
+        return {"seconds": seconds, "session": word, "why": why, "stations": stations}
 
     def status_line(self) -> str:
         """The last second in one line; "" before the first second is over."""

@@ -2,7 +2,7 @@
 (() => {
   "use strict";
   const { header } = document.getElementById("viewer").dataset, find = (id) => document.getElementById(id);
-  const WORDS = ["OK", "HELD", "LOST"], SECONDS = 60, TOKEN = "harness-token", APART_M = 0.65;
+  const SECONDS = 60, TOKEN = "harness-token", APART_M = 0.65;
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const root = find("player"), stage = document.createElement("div"), canvas = document.createElement("canvas"), names = document.createElement("div");
   stage.className = "stage";
@@ -11,7 +11,7 @@
   stage.append(canvas, names);
   root.append(stage);
   const camera = new MotionCamera();
-  let renderer, body, frame, guided, stations, silent = false, pending = 0, recording = "", said = "", token = takeToken();
+  let renderer, body, frame, guided, stations, pending = 0, recording = "", said = "", token = takeToken();
 
   // The token stands behind # in the address that the terminal shows; a tab keeps it, the address bar does not.
   function takeToken() {
@@ -48,7 +48,7 @@
       const worn = new MotionRenderer.Capsules();
       const point = pointOf(frame.joints_mm, [0, 0, 0]), at = point(0);
       camera.target = [at[0], at[1], 0.9];
-      add(point, css(`--${(silent ? "LOST" : WORDS[frame.status]).toLowerCase()}`));
+      add(point, css(`--${find("session").dataset.word.toLowerCase()}`));
       frame.stations.forEach((pose, n) => {
         if (!pose) return;
         const [x, y, z, ...turn] = pose.map((c) => c / 1000);
@@ -114,7 +114,7 @@
   function showStatus(status) {
     const seconds = status.seconds, last = seconds[seconds.length - 1];
     setWord(find("session"), status.session, status.why);
-    if (silent !== status.silent) redraw((silent = status.silent));
+    redraw();
     stations.forEach(({ row }, n) => setWord(row.querySelector(".word"), status.stations[n]));
     recording = status.recording || "";
     find("record").textContent = recording ? "Stop recording" : "Record";

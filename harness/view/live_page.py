@@ -58,7 +58,7 @@ def _page(title: str, stations: Sequence[str], calibrations: Sequence[str]) -> b
         for name, text in (
             ("rate", "Poses:"),
             ("loss", "Readings lost:"),
-            ("latency", "Latency, p50 (line), p99 (dashes):"),
+            ("latency", "Latency p50, p99 (dashed):"),
         )
     ]
     buttons = [
@@ -66,7 +66,7 @@ def _page(title: str, stations: Sequence[str], calibrations: Sequence[str]) -> b
         *(tag("button", _CALIBRATIONS[kind], type_="button", data_kind=kind) for kind in calibrations),
         tag("button", "Record", id_="record", type_="button", title="key R"),
     ]
-    reader = "You can look and not command. Commands need the address that `harness live` shows in its terminal."
+    reader = "You can look and not command. Commands need the address that the terminal of the session shows."
     calibration = tag(
         "section",
         tag("h2"),

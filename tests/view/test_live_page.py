@@ -24,22 +24,21 @@ TPOSE = tpose(SKELETON)
 JOINTS_MM = np.rint(1e3 * np.concatenate([TPOSE[None, :3], pose_from_qpos(SKELETON, TPOSE[None]).end_m[0]]))
 
 
-def frame(number: int, status: int = 0) -> dict[str, Any]:
+def frame(number: int) -> dict[str, Any]:
     joints_mm = JOINTS_MM.astype(int).ravel().tolist()
     return {
         "number": number,
-        "status": status,
         "joints_mm": joints_mm,
         "stations": [[0, 0, 1500, 1000, 0, 0, 0], None],
     }
 
 
-def status(word: str = "OK", why: str = "no reading of torso", silent: bool = False, **more: Any) -> dict[str, Any]:
+def status(word: str = "OK", why: str = "no reading of torso", **more: Any) -> dict[str, Any]:
     seconds = [
         {"rate_hz": 40.0, "p50_ms": 1.5, "p99_ms": 4.0, "loss": 0.25, "quality": [0.9, 0.1 * n]} for n in range(3)
     ]
     stations = ["OK", "LOST"]
-    return {"seconds": seconds, "silent": silent, "session": word, "why": why, "stations": stations, **more}
+    return {"seconds": seconds, "session": word, "why": why, "stations": stations, **more}
 
 
 def posing(number: int, share: float) -> dict[str, Any]:
@@ -113,7 +112,7 @@ def test_the_page_follows_the_session(tab: Any, server: ViewServer) -> None:
     rows = tab.locator("#stations li")
     assert [row.inner_text().split()[:3] for row in rows.all()] == [["head", "OK", "90"], ["torso", "LOST", "20"]]
     captions = tab.locator("#charts figcaption").all_inner_texts()
-    assert captions == ["Poses: 40.0 Hz", "Readings lost: 25.0 %", "Latency, p50 (line), p99 (dashes): 1.5 and 4.0 ms"]
+    assert captions == ["Poses: 40.0 Hz", "Readings lost: 25.0 %", "Latency p50, p99 (dashed): 1.5 and 4.0 ms"]
     for plot, top in zip(tab.locator(".plot .top").all(), ["100 %", "100 %", "40 Hz", "30 %", "4 ms"], strict=True):
         assert plot.inner_text() == top
     assert tab.locator(".plot .zero").all_inner_texts() == ["0"] * 5
@@ -123,7 +122,7 @@ def test_the_page_follows_the_session(tab: Any, server: ViewServer) -> None:
     assert tab.locator("#stations .line").count() == 2, "each station has a chart of its own"
     assert tab.locator(".names span").all_inner_texts() == ["head"], "the station that is lost is not drawn"
     assert tab.evaluate("document.documentElement.scrollWidth") <= 700
-    server.publish("status", status("LOST", "no data for 0.9 s", silent=True))
+    server.publish("status", status("LOST", "no data for 0.9 s"))
     wait_for_text(tab, "#session", "LOST")
     assert tab.inner_text("#session span") == "no data for 0.9 s"
     server.board.close()
