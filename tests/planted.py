@@ -14,7 +14,7 @@ import tomli_w
 from scipy.ndimage import gaussian_filter1d
 
 from harness.core.arrays import Floats, Ints
-from harness.core.humanoid24 import pack, unpack
+from harness.core.humanoid24 import pack, standard_skeleton, unpack
 from harness.core.seeds import generator
 from harness.experiment import ClipEvaluation, Evaluation, ObservedTake, PlannedCell, cells
 from harness.experiment.methods import MethodAnswers
@@ -48,8 +48,10 @@ class Plan:
     """Number of performers that methods know from other takes; by default nobody knows of examples."""
     vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     """Key of the scenario -> values; errors of the n-th one are n times as large."""
-    components: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    components: Mapping[str, Any] = field(default_factory=dict)
     """Changes to the noise."""
+    straight_elbow_deg: Mapping[str, float] = field(default_factory=dict)
+    """Method -> further error of its left elbow while that is bent by less than 30 degrees [deg]."""
     sigma_deg: Mapping[str, float] = field(default_factory=dict)
     """Method -> mean standard deviation that it states, half of it for the first hinge and changing over time [deg]."""
     lags: Mapping[str, int] = field(default_factory=dict)
@@ -115,6 +117,9 @@ def _answer(method: Method, name: str, take: ObservedTake, plan: Plan) -> Evalua
     error_deg = plan.methods[name] * _worse_by(take, plan)
     root_m, quaternion, angles_rad = unpack(truth)
     angles_rad = angles_rad + np.deg2rad(error_deg) * worse * smooth(angles_rad.shape[1])
+    elbow = standard_skeleton().dof_names.index("lradius.rx")
+    straight = np.abs(unpack(truth)[2][:, elbow]) < np.deg2rad(30.0)
+    angles_rad[:, elbow] += np.deg2rad(plan.straight_elbow_deg.get(name, 0.0)) * straight
     qpos = pack(root_m + 0.003 * error_deg * worse * smooth(3), quaternion, angles_rad)
     sigma_rad = None
     if name in plan.sigma_deg:
@@ -149,6 +154,8 @@ class MeansPlan:
     """Method -> its error [deg]."""
     vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     """Key -> values; the n-th makes errors larger by n tenths."""
+    interaction: float = 0.0
+    """Share by which the last values of all keys together make errors larger, beyond what each of them does."""
     seeds: Sequence[int] = (1,)
     """Of a sweep."""
     known: int = 0
@@ -220,6 +227,7 @@ def planted_means(plan: MeansPlan) -> Iterator[None]:
         if name in plan.failing:
             raise ValueError(FAILURE)
         worse = 1.0 + 0.1 * sum(list(plan.vary[varied]).index(value) for varied, value in planned.varied.items())
+        worse += plan.interaction * all(plan.vary[varied][-1] == value for varied, value in planned.varied.items())
         draw = generator(seed, "planted sweep", name, clip, str(planned.varied)).normal()
         error = plan.methods[name] * worse * float(np.exp(0.2 * draw))
         metrics = {**template.metrics, "joint_angle_mean_deg": error, "mpjpe_mm": 6.0 * error, "mpjre_deg": 1.7 * error}

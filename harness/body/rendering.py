@@ -18,6 +18,8 @@ with plain_import():
     import pyvista as pv
 
 _BACKGROUND, _FLOOR, _LINES, _SHADOW = "#f3f5f7", "#e6eaee", "#c9d1d8", "#c3ccd4"
+_LINES_ON_ANY_GROUND = "#8d97a2"
+"""Colour of the grid that is seen on white and on black."""
 _GRID_M, _FLOOR_RADIUS_M = 0.5, 5.0
 _CAMERA_DISTANCE_M = 4.6
 
@@ -25,13 +27,21 @@ _CAMERA_DISTANCE_M = 4.6
 class RenderScene:
     """A plotter with a floor, lights, and a camera that follows the body."""
 
-    def __init__(self, size: tuple[int, int], heading_rad: float, *, off_screen: bool = True) -> None:
-        """`size` is in pixels; `heading_rad` is the body's heading, which the camera sees obliquely from the front."""
+    def __init__(
+        self, size: tuple[int, int], heading_rad: float, *, off_screen: bool = True, transparent: bool = False
+    ) -> None:
+        """`size` is in pixels; `heading_rad` is the body's heading, which the camera sees obliquely from the front.
+
+        Transparent pictures have the lines of the floor alone, for pages that are light or dark.
+        """
+        self._transparent = transparent
         self.plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), lighting="none")
         self.plotter.background_color = pv.Color(_BACKGROUND)
         self.plotter.enable_anti_aliasing("msaa", multi_samples=8)
         self._disc = self.plotter.add_mesh(pv.Disc(inner=0.0, outer=40.0, c_res=48), color=_FLOOR, lighting=False)
-        self._grid = self.plotter.add_mesh(_grid(), color=_LINES, lighting=False, line_width=1.0)
+        self._disc.visibility = not transparent
+        lines = {"color": _LINES_ON_ANY_GROUND, "opacity": 0.4} if transparent else {"color": _LINES}
+        self._grid = self.plotter.add_mesh(_grid(), lighting=False, line_width=1.0, **lines)
         camera = self.plotter.camera
         camera.focal_point = (0.0, 0.0, 0.0)
         camera.position = tuple(
@@ -60,9 +70,12 @@ class RenderScene:
         self.plotter.reset_camera_clipping_range()
 
     def picture(self) -> np.ndarray:
-        """(height, width, 3) picture in bytes; RuntimeError if OpenGL draws nothing."""
+        """(height, width, 3) picture in bytes, with opacity (height, width, 4) if it is transparent.
+
+        RuntimeError if OpenGL draws nothing.
+        """
         self.plotter.render()
-        picture = np.asarray(self.plotter.screenshot(return_img=True))
+        picture = np.asarray(self.plotter.screenshot(return_img=True, transparent_background=self._transparent))
         if picture.std() == 0.0:
             raise RuntimeError("OpenGL is there but draws nothing")
         return picture
@@ -74,7 +87,9 @@ class RenderScene:
 class BodyMesh:
     """One mesh of a body's capsules and ellipsoids, whose points follow the bones, and its shadow."""
 
-    def __init__(self, plotter: "pv.Plotter", skeleton: Skeleton, colour: str, girth: float, opacity: float) -> None:
+    def __init__(
+        self, plotter: "pv.Plotter", skeleton: Skeleton, colour: str, girth: float, opacity: float, shadow: bool = True
+    ) -> None:
         self._parts, meshes, first = [], [], 0
         for geom in body_geoms(skeleton):
             mesh = _mesh(geom.kind, geom.size_m, girth)
@@ -91,7 +106,8 @@ class BodyMesh:
         self.look: Any = actor.prop
         self.look.interpolation = "Phong"
         self.look.ambient, self.look.diffuse, self.look.specular, self.look.specular_power = 0.42, 0.8, 0.25, 12.0
-        self._actors: Any = (actor, plotter.add_mesh(self._shadow, color=_SHADOW, lighting=False))
+        shadows = [plotter.add_mesh(self._shadow, color=_SHADOW, lighting=False)] if shadow else []
+        self._actors: Any = (actor, *shadows)
 
     def set_visible(self, visible: bool) -> None:
         """Show or hide the body and its shadow."""

@@ -13,14 +13,7 @@ if TYPE_CHECKING:
         write_calibration,
     )
     from harness.calibrate.calibration_report import report_pose_calibration, report_tpose_calibration
-    from harness.calibrate.guided_calibration import (
-        Calibrator,
-        GuidedPose,
-        Notifier,
-        PoseDisplay,
-        PoseGuide,
-        TPoseCalibrator,
-    )
+    from harness.calibrate.guided_calibration import GuidedPose, Notifier, PoseDisplay, PoseGuide
     from harness.calibrate.hold import UnusableHold
     from harness.calibrate.kim2012_calibration import SensorMaps, calibrate_kim2012
     from harness.calibrate.liu2011_calibration import calibrate_liu2011
@@ -41,7 +34,6 @@ __all__ = [
     "CalibrationFile",
     "CalibrationOutcome",
     "CalibrationPose",
-    "Calibrator",
     "GuidedPose",
     "Notifier",
     "PerformerPose",
@@ -53,7 +45,6 @@ __all__ = [
     "PoseGuide",
     "SensorMaps",
     "SkeletonPrior",
-    "TPoseCalibrator",
     "UnusableHold",
     "calibrate_kim2012",
     "calibrate_liu2011",

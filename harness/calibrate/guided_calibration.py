@@ -1,4 +1,4 @@
-"""Calibration at the start of a session: from a T-pose, or guided through a list of poses."""
+"""Guided calibration: a performer is led through a list of poses."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -6,64 +6,15 @@ from typing import Protocol
 
 import numpy as np
 
-from harness.body import Body, Mount
 from harness.calibrate.hold import UnusableHold
 from harness.calibrate.performer_preview import PerformerPose, PerformerPreview
 from harness.calibrate.pose_collector import CHECK_EVERY_S, HOLD_S, PoseCollector
 from harness.calibrate.poses import CalibrationPose
-from harness.calibrate.tpose_calibration import TPOSE_S, TPoseCollector, calibrate_tpose
 from harness.core.arrays import Floats
-from harness.core.calibration import Calibration
 from harness.stream import TrackerFrame
 
 Notifier = Callable[[str], None]
 """Shows the user one line of text."""
-MAX_ATTEMPTS = 5
-"""Number of T-poses that may fail before calibration is given up [choice]."""
-
-
-class Calibrator(Protocol):
-    """Computes a calibration from the first frames of a stream."""
-
-    def begin(self, say: Notifier) -> None:
-        """Tell the user what to do."""
-        ...
-
-    def add(self, frame: TrackerFrame, say: Notifier) -> Calibration | None:
-        """Add a frame; returns the calibration once it is known. HarnessError if calibration has failed."""
-        ...
-
-
-class TPoseCalibrator:
-    """A `Calibrator` from the first seconds in which the performer stands still in T-pose."""
-
-    def __init__(self, body: Body, mounts: Sequence[Mount], attempts: int = MAX_ATTEMPTS) -> None:
-        self._body, self._mounts = body, mounts
-        self._attempts_left = attempts
-        self._collector = TPoseCollector()
-
-    def begin(self, say: Notifier) -> None:
-        say(f"calibration: stand in T-pose, arms out to the sides, palms down, for {TPOSE_S:g} s")
-
-    def add(self, frame: TrackerFrame, say: Notifier) -> Calibration | None:
-        """Add a frame; UnusableHold after the last attempt."""
-        if not self._collector.add(frame):
-            return None
-        try:
-            result = calibrate_tpose(self._collector.frames, self._body, self._mounts)
-        except UnusableHold as error:
-            self._attempts_left -= 1
-            if self._attempts_left == 0:
-                raise
-            say(f"calibration: {error} Trying again.")
-            self._collector = TPoseCollector()
-            return None
-        residual_mm, moved_mm = 1e3 * float(result.residual_m.max()), 1e3 * float(result.moved_m.max())
-        say(
-            f"calibration: done; stations are within {residual_mm:.0f} mm of the T-pose and moved by at most "
-            f"{moved_mm:.0f} mm"
-        )
-        return result.calibration
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,6 @@ tracker. Gravity is the tracker's z axis (docs/is900.md 5.3). The performer's po
 the world's frame: by default its origin, facing x. Straps may be put on in any orientation.
 """
 
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -15,13 +14,12 @@ from scipy.special import chdtri
 
 from harness.body import Body, Mount, body_scale, tpose
 from harness.calibrate.held_pose_model import FREE_DOFS, HeldPoseFit, HeldPoseModel
-from harness.calibrate.hold import UnusableHold, measure_hold, span_s
+from harness.calibrate.hold import UnusableHold, measure_hold
 from harness.core import rotations
 from harness.core.arrays import Floats, freeze
 from harness.core.calibration import Calibration
 from harness.stream import TrackerFrame
 
-TPOSE_S = 3.0
 LEVEL_FROM_TRACKER: Floats = np.array([0.0, 1.0, 0.0, 0.0])
 """World from tracker without the heading: x forward, y right, z down is half a turn about x from the world's axes."""
 CONFIDENCE = 0.99
@@ -85,21 +83,6 @@ def calibrate_tpose(
     )
     residual_m = np.linalg.norm(fit.residual_m, axis=1)
     return TPoseCalibration(calibration, residual_m, hold.moved_m, hold.seconds, model.heading_sd_rad)
-
-
-class TPoseCollector:
-    """Keeps the last seconds of a stream. If they are not a T-pose, more frames may be added."""
-
-    def __init__(self, seconds: float = TPOSE_S) -> None:
-        self.seconds = seconds
-        self.frames: deque[TrackerFrame] = deque()
-
-    def add(self, frame: TrackerFrame) -> bool:
-        """Add a frame; True when there are enough to calibrate from."""
-        self.frames.append(frame)
-        while len(self.frames) > 2 and frame.received_s - self.frames[1].received_s >= self.seconds:
-            self.frames.popleft()
-        return span_s(self.frames) >= self.seconds
 
 
 def _require_no_exchange(model: HeldPoseModel, level_m: Floats, fit: HeldPoseFit, mounts: Sequence[Mount]) -> None:

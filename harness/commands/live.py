@@ -25,13 +25,15 @@ from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 
 if TYPE_CHECKING:
     from harness.calibrate import CalibrationFile
-    from harness.experiment import Playback
+    from harness.experiment import CalibrationSession, Playback
     from harness.stream import EventCounter
     from harness.stream.is900 import DriverConfig, Tracker
     from harness.stream.recording import RecordingSwitch
 
 _CALIBRATION_KINDS = ("exact", "tpose", "poses")
 _WARM_UP_FRAMES = 200
+_TPOSES = 5
+"""Number of T-poses that may fail before calibration is given up [choice]."""
 _RATE_TOLERANCE = 0.02
 """Relative difference allowed between the device's rate and the rate that a method learnt at [choice]."""
 
@@ -54,7 +56,7 @@ def add_live(verbs: Verbs) -> None:
     text = "frames per second of the tracker and of the examples (default: the scenario's)"
     add_line_flags(verb, text)
     text = (
-        "exact: the scenario's mounts and body; tpose: mounts from a T-pose in the first seconds; poses: mounts and "
+        "exact: the scenario's mounts and body; tpose: mounts from a T-pose, held first; poses: mounts and "
         "bone lengths from eight poses, held first; FILE: written by `harness calibrate` (default exact)"
     )
     verb.add_argument("--calibration", metavar="exact|tpose|poses|FILE", default="exact", help=text)
@@ -85,11 +87,9 @@ def run_live(args: argparse.Namespace) -> Outcome:
 
 
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
-    from harness.calibrate import TPoseCalibrator
     from harness.commands import live_summary
     from harness.core.files import require_writable
     from harness.core.package_data import VERSION
-    from harness.experiment import CalibrationSession
     from harness.experiment.methods import DEFAULT_ISOLATION, resolve_method
     from harness.live import (
         JitterProbe,
@@ -123,20 +123,15 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     config = _driver_config(args, playback)
     method = resolve_method(args.method, DEFAULT_ISOLATION)
     events = EventCounter(lambda text: print_status(f"line: {text}"))
-    if args.calibration == "poses":
-        stored = _calibrate_by_poses(args.port, config, playback, events, playback_options)
-        playback = playback.with_calibration(stored)
-    elif args.calibration not in _CALIBRATION_KINDS:
+    if args.calibration not in _CALIBRATION_KINDS:
         stored = _read_calibration(args.calibration)
         playback = playback.with_calibration(stored, named=isinstance(stations, list), say=print_status)
+    if guided := _guided_calibrations(args, playback).get(args.calibration):
+        playback = playback.with_calibration(_calibrate_performer(args.port, config, playback, events, guided))
     body, calibration = playback.performer_calibration.body, playback.calibration
-    tpose = args.calibration == "tpose"  # the first seconds of the session calibrate
-    names = tuple(playback.scenario.stations)
-    calibrations = {
-        "tpose": CalibrationSession(args.scenario, names, "tpose", folder=args.mocap, skeleton=body.skeleton),
-        "poses": CalibrationSession(args.scenario, names, folder=args.mocap),
-    }
-    setup = SessionSetup(body.skeleton, names, playback.tracker.rate_hz, f"{args.method} on {args.port}", calibrations)
+    names, title = tuple(playback.scenario.stations), f"{args.method} on {args.port}"
+    calibrations = _guided_calibrations(args, playback)
+    setup = SessionSetup(body.skeleton, names, playback.tracker.rate_hz, title, calibrations)
     with ExitStack() as opened:
         note = {"source": "live", "port": args.port, "harness": VERSION}
         control = SessionControl(RecordingSwitch(note))
@@ -155,7 +150,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
                 device,
                 body,
                 reconstructor,
-                TPoseCalibrator(playback.body, playback.mounts) if tpose else calibration,
+                calibration,
                 outputs,
                 options,
                 control=control,
@@ -229,21 +224,39 @@ def _read_calibration(name: str) -> "CalibrationFile":
     return calibration
 
 
-def _calibrate_by_poses(
-    port: str, config: "DriverConfig", playback: "Playback", events: "EventCounter", options: PlaybackOptions
-) -> "CalibrationFile":
-    """Calibrate from eight poses before methods learn, so that they learn on the performer's bone lengths."""
+def _guided_calibrations(args: argparse.Namespace, playback: "Playback") -> "dict[str, CalibrationSession]":
+    """Calibrations by held poses, by kind, of the stations of a playback; `tpose` is of its body."""
     from harness.experiment import CalibrationSession
+
+    stations, skeleton = tuple(playback.scenario.stations), playback.performer_calibration.body.skeleton
+    return {
+        "tpose": CalibrationSession(args.scenario, stations, "tpose", folder=args.mocap, skeleton=skeleton),
+        "poses": CalibrationSession(args.scenario, stations, folder=args.mocap),
+    }
+
+
+def _calibrate_performer(
+    port: str, config: "DriverConfig", playback: "Playback", events: "EventCounter", session: "CalibrationSession"
+) -> "CalibrationFile":
+    """Calibrate by held poses before methods learn, so that they learn on the performer's bone lengths.
+
+    A T-pose that cannot be used is asked for again, up to `_TPOSES` times.
+    """
+    from harness.calibrate import UnusableHold
     from harness.live import PoseTerminal
 
-    session = CalibrationSession(options.scenario, tuple(playback.scenario.stations), folder=options.folder)
     with _open_device(port, config, playback, events) as device:
-        terminal = PoseTerminal(session.body.skeleton, sys.stderr)
-        try:
-            held = session.collect_poses(device, print_status, [terminal]).holds
-        finally:
-            terminal.close()
-    found = session.solve(held, port)
+        for left in reversed(range(_TPOSES if session.kind == "tpose" else 1)):
+            terminal = PoseTerminal(session.body.skeleton, sys.stderr)
+            try:
+                found = session.solve(session.collect_poses(device, print_status, [terminal]).holds, port)
+                break
+            except UnusableHold as error:
+                if not left:
+                    raise
+                print_status(f"{error} Trying again.")
+            finally:
+                terminal.close()
     for line in found.lines:
         print_status(line)
     return found.file

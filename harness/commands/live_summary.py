@@ -14,7 +14,6 @@ def as_dict(result: LiveResult, jitter: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "seconds": result.seconds,
         "frames": result.captured,
-        "frames_before": result.frames_before,
         "frames_dropped": result.dropped,
         "poses": result.poses,
         "status": result.status,
@@ -41,8 +40,6 @@ def lines(result: LiveResult, jitter: Mapping[str, Any]) -> list[str]:
         ", ".join(f"{count} {name}" for name, count in counted.items()) for counted in (result.status, result.origin)
     )
     counts = f"{result.poses} poses in {result.seconds:.1f} s ({states}); {result.dropped} frames dropped"
-    if result.frames_before:
-        counts += f", {result.frames_before} before the first"
     share = stages.missed / result.poses if result.poses else 0.0
     late = f"{stages.missed} poses ({share:.2%}) after their deadline, {1e3 * stages.deadline_s:.2f} ms"
     failed = [f"{name}: {why}" for name, why in result.failed.items()]

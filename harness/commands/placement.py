@@ -14,7 +14,10 @@ if TYPE_CHECKING:
     from harness.results.findings import PlacementFindings, StatisticalPower
     from harness.study.placement.question import PlacementQuestion
 
-_QUESTION_FLAGS = ("stations", "behaviour", "places", "method", "noise", "physics", "minutes", "clips", "seed")
+_QUESTION_FLAGS = (
+    *("stations", "behaviour", "places", "with", "cost", "symmetric", "method", "second_method", "split", "noise"),
+    *("physics", "baud", "effort", "minutes", "clips", "seed"),
+)
 _EXAMPLE = "harness placement --stations 3 --behaviour table_tennis"
 
 
@@ -26,7 +29,7 @@ def add_placement(verbs: Verbs) -> None:
     text = "clips computed at the same time (default 2)"
     verb.add_argument("--jobs", type=process_count, default=2, metavar="N", help=text)
     question = verb.add_argument_group("question", f"instead of a study, such as `{_EXAMPLE}`")
-    text = "number of stations, such as 3 or 2-4 (default 3)"
+    text = "number of stations, such as 3 or 2-4 (default 3; one more than those of --with)"
     question.add_argument("--stations", type=parse_sizes, metavar="N", help=text)
     text = (
         "walking, boxing, jumping, golf or table_tennis of the built-in motion, or behaviours of the library with "
@@ -35,16 +38,30 @@ def add_placement(verbs: Verbs) -> None:
     question.add_argument("--behaviour", metavar="A,B", help=text)
     text = "places to choose from (default: one on each of eleven segments; `harness list places` names all)"
     question.add_argument("--places", metavar="A,B", help=text)
+    text = "stations that are worn in any case, such as head,left_hand; --stations counts them too"
+    question.add_argument("--with", metavar="A,B", help=text)
+    text = "costs of places, such as head=2,wrist=1 (default 1 each; wrist is either wrist): shows error against cost"
+    question.add_argument("--cost", type=parse_costs, metavar="A=N,B=N", help=text)
+    text = "left and right are one place: both sides are worn or neither, which counts as two stations"
+    question.add_argument("--symmetric", action="store_true", default=None, help=text)
     question.add_argument("--method", metavar="NAME", help="the method whose error counts (default expert_map)")
+    text = "a method that the answer is repeated with, or none (default ik; expert_map for ik itself)"
+    question.add_argument("--second-method", metavar="NAME", help=text)
+    text = "subject: methods learn from other performers than those tested (default sequence: from other takes)"
+    question.add_argument("--split", choices=["sequence", "subject"], help=text)
     text = "noise preset of the tracker (default: default)"
     question.add_argument("--noise", choices=["clean", "noise", "default"], help=text)
     text = (
         "simulate ultrasound, line of sight and inertia under this constellation, such as hall (default: noise alone)"
     )
     question.add_argument("--physics", metavar="NAME", help=text)
-    text = "budget of time, which limits sets and clips (default 10)"
+    text = "rate of the serial line, which limits the frames of many stations (default 115200)"
+    question.add_argument("--baud", type=positive_int, metavar="N", help=text)
+    text = "how thoroughly sets are searched, as a number of cells (default normal); the answer does not depend on time"
+    question.add_argument("--effort", choices=["quick", "normal", "thorough"], help=text)
+    text = "chooses the effort that takes about so long on two quiet cores; a slower computer takes longer"
     question.add_argument("--minutes", type=positive_float, metavar="N", help=text)
-    text = "number of clips to choose on, without regard to --minutes (default: what the budget allows, at most 16)"
+    text = "number of clips of each behaviour to choose on, every set on all of them, instead of an effort"
     question.add_argument("--clips", type=positive_int, metavar="N", help=text)
     question.add_argument("--seed", type=int, help="seed of motion and noise (default 1)")
 
@@ -57,10 +74,21 @@ def parse_sizes(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2] or match[1])
 
 
+def parse_costs(text: str) -> dict[str, float]:
+    """Costs by place from head=2,wrist=1.5, for argparse."""
+    costs: dict[str, float] = {}
+    for entry in text.split(","):
+        name, _, number = (part.strip() for part in entry.partition("="))
+        if not name or name in costs:
+            raise argparse.ArgumentTypeError(f"{text!r} is no list of costs, such as head=2,wrist=1")
+        costs[name] = positive_float(number)
+    return costs
+
+
 def run_placement(args: argparse.Namespace) -> Outcome:
     from harness.experiment.workers import process_executor
     from harness.report.placement.page import placement_text, write_placement_page
-    from harness.report.placement.wording import placement_sentence
+    from harness.report.placement.wording import placement_sentence, size_sentences
     from harness.results.files import FINDINGS
     from harness.study.placement import placement_study
 
@@ -81,16 +109,18 @@ def run_placement(args: argparse.Namespace) -> Outcome:
         )
     with show_steps("parts of the report"):
         page = write_placement_page(out)
-    answer = placement_sentence(findings)
-    content = {"answer": answer, **record_content(findings, out=out, report=page)}
-    lines = (placement_text(findings), "", f"findings: {out / FINDINGS}", f"report: {page}", answer)
+    answer, beside = placement_sentence(findings), size_sentences(findings)
+    content = {"answer": answer, "other_sizes": beside, **record_content(findings, out=out, report=page)}
+    lines = (placement_text(findings), "", f"findings: {out / FINDINGS}", f"report: {page}", answer, *beside)
     following = ["plot", out] if outcome is Outcome.PASS else this_words()
     return print_result(args, content, *lines, outcome=outcome, following=following)
 
 
 def _read_question(args: argparse.Namespace) -> "PlacementQuestion | None":
     """The question on the command line; None for a study. BadInput for both and for neither."""
-    from harness.study.placement.question import DEFAULT_METHOD, DEFAULT_MINUTES, PlacementQuestion
+    from harness.body import select_places
+    from harness.study.placement.effort import effort_within
+    from harness.study.placement.question import DEFAULT_METHOD, DEFAULT_STATIONS, PlacementQuestion
 
     if args.study is not None:
         advice = "A study has its own: name a study or ask a question."
@@ -98,32 +128,45 @@ def _read_question(args: argparse.Namespace) -> "PlacementQuestion | None":
         return None
     if all(getattr(args, name) is None for name in _QUESTION_FLAGS):
         raise BadInput("Neither a study nor a question.", f"Type: {_EXAMPLE}; or: harness placement walking")
-    fewest, most = args.stations or (3, 3)
+    limits = [name for name in ("effort", "minutes", "clips") if getattr(args, name) is not None]
+    if len(limits) > 1:
+        raise BadInput(f"--{limits[0]} with --{limits[1]}.", "Each of them limits the search: name one.")
+    base = _split_names(getattr(args, "with"), "--with")
+    usual = len(select_places(base)) + 1 if base else DEFAULT_STATIONS
+    fewest, most = args.stations or (usual, usual)
     return PlacementQuestion(
         fewest,
         most,
-        _split_names(args.behaviour, "--behaviour") if args.behaviour is not None else ("walking",),
-        places=_split_names(args.places, "--places") if args.places is not None else (),
+        _split_names(args.behaviour, "--behaviour") or ("walking",),
+        places=_split_names(args.places, "--places"),
         method=args.method or DEFAULT_METHOD,
         noise=args.noise or "default",
         constellation=args.physics or "",
-        minutes=args.minutes or DEFAULT_MINUTES,
+        effort=effort_within(args.minutes) if args.minutes is not None else args.effort or "",
         clips=args.clips or 0,
         seed=1 if args.seed is None else args.seed,
+        split=args.split or "sequence",
+        base=base,
+        costs=args.cost or {},
+        symmetric=bool(args.symmetric),
+        baud=args.baud or 0,
+        second_method=args.second_method or "",
     )
 
 
-def _split_names(text: str, flag: str) -> tuple[str, ...]:
-    """Names separated by commas; BadInput for an empty one."""
+def _split_names(text: str | None, flag: str) -> tuple[str, ...]:
+    """Names separated by commas, () without a text; BadInput for an empty one."""
+    if text is None:
+        return ()
     names = tuple(name.strip() for name in text.split(","))
     if not all(names):
         raise BadInput(f"{flag} {text!r} has an empty name.", "Separate names by commas.")
     return names
 
 
-def _announce(power: "StatisticalPower", notes: tuple[str, ...]) -> None:
-    """Tell on stderr, before the cells run, what they can show and how long they take."""
+def _announce(news: "StatisticalPower | str") -> None:
+    """Tell on stderr what the cells can show and how long they take, or how a search goes on."""
     from harness.report.placement.wording import power_sentences
 
-    for line in (*notes, *power_sentences(power)):
+    for line in [news] if isinstance(news, str) else power_sentences(news):
         print_status(line)

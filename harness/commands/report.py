@@ -32,15 +32,16 @@ def run_report(args: argparse.Namespace) -> Outcome:
         require_kind(args.run, "run")
     if kind != "run":
         return {"sweep": _report_sweep, "placement": _report_placement, "paper": _report_paper}[kind](args)
+    from harness.report.run.losses import loss_sentence
     from harness.report.run.page import write_run_page
 
     with show_steps("parts of the report"):
-        page = write_run_page(args.run)
+        page, why = write_run_page(args.run), loss_sentence(args.run)
     if args.readme:
         from harness.report.figures.performer_table import update_readme
 
         update_readme(args.readme, args.run, split_list(args.methods))
-    return _print_page(args, page, following=["plot", args.run, "--kind", "ranking"])
+    return _print_page(args, page, why, following=["plot", args.run, "--kind", "ranking"])
 
 
 def _report_sweep(args: argparse.Namespace) -> Outcome:
@@ -73,8 +74,8 @@ def _report_paper(args: argparse.Namespace) -> Outcome:
     return _print_page(args, page)
 
 
-def _print_page(args: argparse.Namespace, page: Path, following: Sequence[object] = ()) -> Outcome:
-    """Print the page that was written, and the page with tables that was updated."""
-    lines = [f"report: {page}", *([f"tables: {args.readme}"] if args.readme else [])]
+def _print_page(args: argparse.Namespace, page: Path, why: str = "", following: Sequence[object] = ()) -> Outcome:
+    """Print the page that was written, why a method loses, and the page with tables that was updated."""
+    lines = [*filter(None, [why]), f"report: {page}", *([f"tables: {args.readme}"] if args.readme else [])]
     content = {"report": str(page), "readme": args.readme and str(args.readme)}
     return print_result(args, content, *lines, following=following)

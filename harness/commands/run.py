@@ -39,6 +39,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
 
     from harness.experiment import run
     from harness.experiment.scenarios import check_scenario, load_scenario
+    from harness.report.run.losses import loss_sentence
     from harness.report.run.text import run_table
     from harness.results import read_summary
 
@@ -72,6 +73,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         args,
         content,
         run_table(summary, short=not args.all),
+        *filter(None, [loss_sentence(out)]),
         f"report: {page}" if page else f"results: {out}",
         outcome=outcome,
         following=["view", out] if outcome is Outcome.PASS else ["status", out],

@@ -116,6 +116,22 @@ def sign_flip_p(difference: Floats) -> float:
     return (1 + extreme) / (1 + _DRAWS)  # the observed signs are one of the flips
 
 
+def sign_flip_max_p(lines: Sequence[Floats]) -> list[float]:
+    """p of (n,) differences of several lines over the same units, corrected for their number.
+
+    It is the share of flips, each of a unit in all lines at once, whose largest statistic of any line is at least that
+    of the line itself (Westfall and Young 1993, max T). Unlike Holm's correction it can be small with few units.
+    """
+    values = np.stack(lines, axis=1)
+    values = values / np.maximum(np.sqrt(np.sum(values**2, axis=0)), np.finfo(float).tiny)
+    least = np.abs(values.sum(axis=0)) * (1.0 - 1e-9)
+    largest = np.concatenate([np.abs(flips @ values).max(axis=1) for flips in _sign_flips(len(values))])
+    extreme = (largest[:, None] >= least).sum(axis=0)
+    exact = len(values) <= _EXACT_UNITS
+    p = extreme / 2.0 ** (len(values) - 1) if exact else (1 + extreme) / (1 + _DRAWS)
+    return [float(each) if each_least > 0.0 else 1.0 for each, each_least in zip(p, least, strict=True)]
+
+
 def smallest_possible_p(difference: Floats) -> float:
     """The smallest p that differences of these sizes can have: that of equal signs."""
     return sign_flip_p(np.abs(difference))

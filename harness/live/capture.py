@@ -1,7 +1,5 @@
 """The capture thread, which only reads the tracker, and the queue to the solving thread: no byte waits for a pose."""
 
-import time
-from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Generic, TypeVar
@@ -39,30 +37,16 @@ class DroppingQueue(Generic[T]):
             self._items.put(None)  # for the next call
         return item
 
-    def drop_all(self) -> None:
-        """Drop and count all items in the queue; called by the consumer."""
-        for _ in range(len(self)):
-            if self._items.get() is None:
-                self.end()
-            else:
-                self.dropped += 1
-
     def end(self) -> None:
         """Mark the end; items in the queue can still be taken."""
         self._items.put(None)
 
 
-CapturedFrame = tuple[TrackerFrame, float]
-"""A frame, and the time on the host's monotonic clock at which the stream delivered it [s]."""
-
-
 class CaptureThread:
     """Moves frames from a stream to a queue; the queue ends when the stream ends."""
 
-    def __init__(
-        self, stream: TrackerStream, queue: DroppingQueue[CapturedFrame], clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        self._stream, self._queue, self._clock = stream, queue, clock
+    def __init__(self, stream: TrackerStream, queue: DroppingQueue[TrackerFrame]) -> None:
+        self._stream, self._queue = stream, queue
         self._thread = Thread(target=self._run, name="capture")
         self.frames = 0
         self.error: Exception | None = None
@@ -81,7 +65,7 @@ class CaptureThread:
         try:
             for frame in self._stream:
                 self.frames += 1
-                self._queue.put((frame, self._clock()))
+                self._queue.put(frame)
         except Exception as error:  # `run_session` raises it again
             self.error = error
         finally:

@@ -41,10 +41,10 @@ class WorldTurn:
     def forward(self, qpos: Floats) -> "WorldTurn | None":
         """The turn by which a body in a configuration (55,) of the outputs faces x, in the place where it stands.
 
-        None for a body whose pelvis faces up or down.
+        None for a body whose pelvis faces up or down, and for none.
         """
         facing = rotations.rotate(qpos[3:7] / np.linalg.norm(qpos[3:7]), np.array([1.0, 0.0, 0.0]))
-        if np.hypot(facing[0], facing[1]) < _LEAST_SHARE:
+        if not np.hypot(facing[0], facing[1]) >= _LEAST_SHARE:  # NaN, too, is no pose
             return None
         back = rotations.about_z(-float(np.arctan2(facing[1], facing[0])))
         pivot_m = qpos[:3] * [1.0, 1.0, 0.0]

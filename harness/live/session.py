@@ -14,14 +14,13 @@ from threading import Event, Thread
 import numpy as np
 
 from harness.body import Body, Kinematics
-from harness.calibrate import Calibrator, Notifier
+from harness.calibrate import Notifier
 from harness.core import rotations
-from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Origin, Status
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
-from harness.live.capture import CapturedFrame, CaptureThread, DroppingQueue
+from harness.live.capture import CaptureThread, DroppingQueue
 from harness.live.heading import UNTURNED, WorldTurn
 from harness.live.latency import StageLatencies, collect_garbage, low_latency_mode
 from harness.live.live_statistics import LiveStatistics
@@ -47,12 +46,9 @@ class LiveOptions:
     deadline_s: float | None = None
     """Longest allowed time from the last byte to the pose [s]; one frame period by default."""
     seconds: float | None = None
-    """Duration after which the session ends, without calibration [s]; unlimited by default."""
+    """Duration after which the session ends [s]; unlimited by default."""
     queue_frames: int = QUEUE_FRAMES
     """Length of the queue between the two threads."""
-    host_timestamps: bool = True
-    """Whether `received_s` of the frames is on the host's monotonic clock. For a recording it is not, and latencies are
-    measured from the time at which the stream delivers a frame."""
 
 
 @dataclass(eq=False)
@@ -62,8 +58,6 @@ class LiveResult:
     stages: StageLatencies
     captured: int = 0
     """Frames that the stream delivered."""
-    frames_before: int = 0
-    """Frames before the calibration was done and the method was ready."""
     dropped: int = 0
     """Frames that the queue dropped."""
     status: dict[str, int] = field(default_factory=lambda: {state.name.lower(): 0 for state in Status})
@@ -102,7 +96,7 @@ def run_session(
     stream: TrackerStream,
     body: Body,
     reconstructor: Reconstructor,
-    calibration: Calibration | Calibrator,
+    calibration: Calibration,
     outputs: Sequence[Output],
     options: LiveOptions,
     *,
@@ -113,13 +107,12 @@ def run_session(
 ) -> LiveResult:
     """Run until the stream ends, the time of `options` is over or Ctrl-C; then close stream and outputs.
 
-    A `Calibrator` calibrates from the first frames. An error of the stream or the method is raised after everything is
-    closed. An output that fails is closed and reported through `say`; the others continue. `control` takes commands
-    of other threads. `progress` receives the status line about once a second, and `say` which stations are lost or
-    back.
+    An error of the stream or the method is raised after everything is closed. An output that fails is closed and
+    reported through `say`; the others continue. `control` takes commands of other threads. `progress` receives the
+    status line about once a second, and `say` which stations are lost or back.
     """
-    queue: DroppingQueue[CapturedFrame] = DroppingQueue(options.queue_frames)
-    capture = CaptureThread(stream, queue, clock)
+    queue: DroppingQueue[TrackerFrame] = DroppingQueue(options.queue_frames)
+    capture = CaptureThread(stream, queue)
     statistics = LiveStatistics(stream.stations, clock)
     control = control or SessionControl()
     control.reconstructor = reconstructor
@@ -131,14 +124,14 @@ def run_session(
             solver.prepare()
             thread.start()
             capture.start()
-            shown_s = clock()
+            start_s = shown_s = clock()
             while not solver.done.wait(_POLL_PERIOD_S):
-                for message in statistics.update(solver.dropped):
+                for message in statistics.update(queue.dropped):
                     say(message)
                 if clock() - shown_s >= _STATUS_PERIOD_S:
                     shown_s = clock()
                     progress(statistics.status_line())
-                if options.seconds is not None and clock() - solver.start_s >= options.seconds:
+                if options.seconds is not None and clock() - start_s >= options.seconds:
                     break
     except KeyboardInterrupt:
         stopped = True
@@ -152,7 +145,7 @@ def run_session(
         progress("")
     if error := solver.error or capture.error:
         raise error
-    solver.result.captured, solver.result.dropped = capture.frames, solver.dropped
+    solver.result.captured, solver.result.dropped = capture.frames, queue.dropped
     solver.result.stopped = stopped
     return solver.result
 
@@ -162,10 +155,10 @@ class _SolverThread:
 
     def __init__(
         self,
-        queue: DroppingQueue[CapturedFrame],
+        queue: DroppingQueue[TrackerFrame],
         body: Body,
         reconstructor: Reconstructor,
-        calibration: Calibration | Calibrator,
+        calibration: Calibration,
         outputs: Sequence[Output],
         options: LiveOptions,
         control: SessionControl,
@@ -174,41 +167,30 @@ class _SolverThread:
         statistics: LiveStatistics,
     ) -> None:
         self._statistics = statistics
-        self._queue, self._reconstructor, self._calibration = queue, reconstructor, calibration
+        self._queue, self._reconstructor = queue, reconstructor
         self._outputs, self._options, self._say, self._clock = list(outputs), options, say, clock
-        self._control, self._world_turn = control, UNTURNED
-        self._room: tuple[Floats, Floats] | None = None
-        """Position and orientation of the tracker's frame in the world of the outputs."""
+        self._control = control
         self._newest: Estimate | None = None
         self._kinematics = Kinematics(body)
         self._host_clock = HostClockEstimator()
         deadline_s = 1.0 / options.rate_hz if options.deadline_s is None else options.deadline_s
         self.result = LiveResult(StageLatencies(deadline_s))
         self._session: Session | None = None
-        self._frames_discarded = 0
-        """Frames that came while the method prepared."""
+        self._place(calibration, UNTURNED)
         self._first_s = 0.0
         self._waiting: deque[tuple[TrackerFrame, float]] = deque()
         """The frame that was answered last and those after it, with their times of measurement [s]."""
-        self.start_s = float("inf")
-        """Time at which calibration was done [s]."""
         self.done = Event()
         self.error: Exception | None = None
 
     def prepare(self) -> None:
-        """Begin the method's session now if the calibration is known."""
-        if isinstance(self._calibration, Calibration):
-            self._session = self._reconstructor.begin(self._calibration)
-            self._place(self._calibration, UNTURNED)
+        """Begin the method's session."""
+        self._session = self._reconstructor.begin(self._calibration)
 
     def run(self) -> None:
         try:
-            session = self._session
-            if not isinstance(self._calibration, Calibration):
-                session = self._calibrate(self._calibration)
-            if session is not None:
-                self.start_s = self._clock()
-                self._solve(session)
+            if self._session is not None:
+                self._solve(self._session)
         except Exception as error:  # `run_session` raises it again
             self.error = error
         finally:
@@ -225,30 +207,8 @@ class _SolverThread:
         except Exception as error:  # the other outputs must be closed too
             self.result.failed.setdefault(output.name, _error_text(error))
 
-    @property
-    def dropped(self) -> int:
-        """Frames that the queue dropped so far, but for those that came while the method prepared."""
-        return self._queue.dropped - self._frames_discarded
-
-    def _calibrate(self, calibrator: Calibrator) -> Session | None:
-        """Calibrate from the first frames and begin a session; None if the stream ends before."""
-        calibrator.begin(self._say)
-        calibration: Calibration | None = None
-        while calibration is None:
-            if (captured := self._queue.take()) is None:
-                self._say("calibration: the stream ended before it was done")
-                return None
-            self.result.frames_before += 1
-            calibration = calibrator.add(captured[0], self._say)
-        session = self._reconstructor.begin(calibration)  # a method may need some time for it
-        self._place(calibration, UNTURNED)
-        self._queue.drop_all()
-        self._frames_discarded = self._queue.dropped
-        self.result.frames_before += self._frames_discarded
-        return session
-
     def _place(self, calibration: Calibration, turn: WorldTurn) -> None:
-        """Set the calibration and the turn of the world by which outputs see bodies and stations."""
+        """Set the calibration and the turn of the world by which outputs see bodies, and the place of the tracker."""
         self._calibration, self._world_turn = calibration, turn
         self._room = turn.pose(calibration.tracker_origin_m, calibration.world_from_tracker)
 
@@ -261,7 +221,7 @@ class _SolverThread:
             return
         pose, before = self._newest, self._world_turn
         turned = None if pose is None or pose.status is Status.LOST else before.forward(pose.qpos)
-        if turned is None or not isinstance(self._calibration, Calibration):
+        if turned is None:
             advice = "Stand upright and in sight of the tracker, then try again."
             request.answer.set_exception(BadInput("The performer is lost, or lies: no heading is known.", advice))
             return
@@ -270,13 +230,12 @@ class _SolverThread:
 
     def _solve(self, session: Session) -> None:
         number, lag, collected_s, done = 0, 0, self._clock(), self.result
-        while (captured := self._queue.take()) is not None:
+        while (frame := self._queue.take()) is not None:
             taken_s = self._clock()
             if (request := self._control.next_request()) is not None:
                 if request.session is not None:
                     session, lag = request.session, 0
                 self._carry_out(request)
-            frame, captured_s = captured
             estimate = session.step(frame)
             if self._world_turn is not UNTURNED:
                 estimate = replace(estimate, qpos=self._world_turn.qpos(estimate.qpos))
@@ -292,9 +251,8 @@ class _SolverThread:
             pose = LivePose(number, answered, taken_s, ready_s, measured_s, estimate, self._kinematics, self._room)
             self._send(pose)
             sent_s = self._clock()
-            received_s = frame.received_s if self._options.host_timestamps else captured_s
-            done.stages.add(received_s, taken_s, ready_s, sent_s)
-            self._statistics.add(frame, estimate.status, ready_s - received_s)
+            done.stages.add(frame.received_s, taken_s, ready_s, sent_s)
+            self._statistics.add(frame, estimate.status, ready_s - frame.received_s)
             done.status[estimate.status.name.lower()] += 1
             done.origin[estimate.origin.name.lower()] += 1
             self._first_s = self._first_s or ready_s

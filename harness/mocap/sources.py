@@ -29,6 +29,13 @@ def _synthetic_names() -> tuple[str, ...]:
     return (*chain.from_iterable(takes), *RIG_TAKES)
 
 
+@cache
+def _unlisted_names() -> frozenset[str]:
+    """Takes of the performers that no list names."""
+    takes = (synthetic.take_names(behaviour, synthetic.UNLISTED_PERFORMERS) for behaviour in synthetic.BEHAVIOURS)
+    return frozenset(chain.from_iterable(takes))
+
+
 class SyntheticSource:
     """Takes of the motion generator; `seed` is the scenario's."""
 
@@ -42,8 +49,8 @@ class SyntheticSource:
         return _synthetic_names()
 
     def check(self, name: str) -> None:
-        """Raise UnknownName unless there is such a take."""
-        if name not in _synthetic_names():
+        """Raise UnknownName unless there is such a take, listed or not."""
+        if name not in _synthetic_names() and name not in _unlisted_names():
             raise UnknownName("synthetic take", name, self.names())
 
     def subject(self, name: str) -> str:

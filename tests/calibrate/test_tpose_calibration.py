@@ -11,7 +11,7 @@ import pytest
 
 from harness.body import DEFAULT_MOUNTS, Body, Kinematics, Mount, build_body, locate_mount, retarget_to_own_body, tpose
 from harness.calibrate.hold import UnusableHold, median_rotation
-from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER, TPoseCollector, calibrate_tpose
+from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER, calibrate_tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
@@ -323,17 +323,6 @@ def test_a_body_of_another_size_is_no_t_pose_of_this_one() -> None:
     session = Session(build_body(own.with_bones(0.8 * own.bone_m)))
     with pytest.raises(UnusableHold, match="not a T-pose of the body"):
         calibrate_tpose(session.held()[0], bodies()[0], session.mounts)
-
-
-def test_the_collector_keeps_the_last_seconds() -> None:
-    session = Session(bodies()[0])
-    frames, _ = session.held(seconds=4.0)
-    collector = TPoseCollector(2.5)
-    enough = [collector.add(frame) for frame in frames]
-    assert enough.index(True) == pytest.approx(100, abs=1)
-    assert all(enough[enough.index(True) :])
-    assert list(collector.frames) == frames[-len(collector.frames) :]
-    assert calibrate_tpose(list(collector.frames), session.body, session.mounts).seconds == pytest.approx(2.5, abs=0.05)
 
 
 def test_the_median_of_rotations_leaves_outliers_alone(rng: np.random.Generator) -> None:

@@ -7,12 +7,21 @@ from contextlib import redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from harness.body import Body, build_body
-from harness.calibrate import POSES, CalibrationFile, GuidedPose, read_calibration, write_calibration
+from harness.body import Body, build_body, tpose
+from harness.calibrate import (
+    POSES,
+    CalibrationFile,
+    CalibrationOutcome,
+    GuidedPose,
+    UnusableHold,
+    read_calibration,
+    write_calibration,
+)
 from harness.cli import main
 from harness.core import rotations
 from harness.core.calibration import Calibration
@@ -21,6 +30,7 @@ from harness.core.humanoid24 import BONES
 from harness.core.motion import BodyMotion
 from harness.experiment import CalibrationSession, Playback, prepare_playback
 from harness.reconstruct import Session, make_method
+from harness.simulate import simulate_loop
 from harness.stream import TrackerFrame
 from harness.stream.is900 import serve_emulator
 from harness.stream.recording import RecordingStream
@@ -170,6 +180,39 @@ def test_a_live_session_begins_with_eight_poses(model: Playback, monkeypatch: py
     assert told.kind == "poses"
     assert len(frames) > 10
     assert np.linalg.norm(told.mount_m - model.calibration.mount_m, axis=1).max() < 0.025
+
+
+@pytest.mark.long
+def test_a_live_session_begins_with_a_t_pose(
+    model: Playback, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A performer half a metre aside; the first T-pose is refused, as if the stations did not tell the heading."""
+    witness, refused = Witness(), list[UnusableHold]()
+    monkeypatch.setattr("harness.experiment.methods.remote_method.make_method", lambda name: witness)
+    solve = CalibrationSession.solve
+
+    def refuse_once(session: CalibrationSession, held: Any, source: str) -> CalibrationOutcome:
+        if not refused:
+            refused.append(UnusableHold("Stations look exchanged.", "Exchange them."))
+            raise refused[-1]
+        return solve(session, held, source)
+
+    monkeypatch.setattr(CalibrationSession, "solve", refuse_once)
+    upright = np.array(tpose(model.body.skeleton))
+    upright[1] += 0.5
+    take = BodyMotion("stand", "p1", "test", "", 40.0, np.tile(upright, (400, 1)))
+    noise = model.scenario.noise_model
+    standing = simulate_loop(model.body, take, model.scenario.nominal_mounts, model.tracker, noise, seed=1)
+    with serve_emulator(standing, tcp="127.0.0.1:0") as device:
+        what = ["--scenario", "demo", "--clip", CLIP, "--calibration", "tpose", "--seconds", "1"]
+        assert main(["live", "--port", device.name, *what]) == 0
+    told, frames = witness.sessions[-1]
+    assert told.kind == "tpose"
+    assert len(frames) > 10
+    np.testing.assert_allclose(told.tracker_origin_m, model.calibration.tracker_origin_m - [0.0, 0.5, 0.0], atol=0.05)
+    said = capsys.readouterr().err
+    assert "Stand upright, arms straight out" in said
+    assert "Stations look exchanged. Exchange them. Trying again." in said
 
 
 @pytest.mark.slow

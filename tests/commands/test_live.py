@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import signal
 import socket
 import subprocess
@@ -9,6 +10,8 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
@@ -16,6 +19,7 @@ import pytest
 from harness.experiment import Playback, prepare_playback
 from harness.reconstruct import make_method
 from harness.stream.is900 import serve_emulator
+from harness.view import COMMAND_HEADER
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness
 
@@ -113,6 +117,69 @@ def test_it_ends_after_its_time_and_says_how_it_went(tmp_path: Path, played: Pla
     assert lines[0].split() == ["milliseconds", "p50", "p99", "max"]
     assert "the computer: a timer is late" in said
     assert "stations 1 left_hand, 2 right_hand, 3 left_ankle, 4 right_ankle" in talk
+
+
+@pytest.mark.long
+def test_the_page_commands_a_session_and_its_recording_can_be_scored(
+    tmp_path: Path, played: Playback, command: Command
+) -> None:
+    recorded, before = tmp_path / "recorded", sorted(Path().iterdir())
+    recorded.mkdir()
+    words = ["--view", "browser", "--no-browser", "--out", recorded, "--json"]
+    with (
+        serve_emulator(played.samples, tcp="127.0.0.1:0") as device,
+        live("--port", device.name, *words) as program,
+    ):
+        page = LivePage(program)
+        page.wait_for_pose(20)
+        assert page.command("record", on=True)["recording"].startswith("live_2")
+        assert abs(page.command("heading")["turn_deg"]) < 180.0
+        page.wait_for_pose(page.number + 160)
+        path = Path(page.command("record", on=False)["saved"])
+        assert page.command("record", on=True)["recording"] != path.name
+        code, said, talk = interrupt(program)
+    assert code == 0, talk
+    assert json.loads(said)["poses"] > 180
+    assert path.parent == recorded
+    assert len(list(recorded.iterdir())) == 2, "the second recording ends with the session"
+    assert sorted(Path().iterdir()) == before
+    scored = command("replay", path, "--scenario", "demo", "--clip", "boxing_p1_01", "--methods", "ik", "--json")
+    (method,) = json.loads(scored.out)["methods"]
+    assert method["frames_matched"] > 50
+    assert method["metrics"]["joint_angle_mean_deg"] < 10.0
+
+
+class LivePage:
+    """The page of a session in another process, as a program commands it."""
+
+    def __init__(self, program: "subprocess.Popen[str]") -> None:
+        """Wait until the session takes commands."""
+        said, line = "", ""
+        while "Ctrl-C ends it" not in line:
+            assert program.stderr is not None
+            line = program.stderr.readline()
+            said += line
+            assert line, said
+        found = re.search(r"view: (\S+)#(\S+)", said)
+        assert found
+        self._url, self._token = found.groups()
+        self.number = -1
+
+    def wait_for_pose(self, number: int) -> None:
+        """Wait until the page has the pose of this number, or a later one."""
+        until_s = time.monotonic() + 120.0
+        while self.number < number:
+            assert time.monotonic() < until_s
+            with urlopen(f"{self._url}events") as answer:  # noqa: S310
+                self.number = dict(json.load(answer)["messages"]).get("frame", {}).get("number", -1)
+
+    def command(self, name: str, **content: object) -> dict[str, Any]:
+        """The answer to a command."""
+        headers = {COMMAND_HEADER: self._token}
+        request = Request(f"{self._url}command/{name}", json.dumps(content).encode(), headers)  # noqa: S310
+        with urlopen(request) as answer:  # noqa: S310
+            found: dict[str, Any] = json.load(answer)
+            return found
 
 
 def test_another_rate_than_the_scenarios(command: Command) -> None:

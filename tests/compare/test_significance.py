@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from harness.compare import significance
-from harness.compare.significance import SignificanceResult, decide_verdicts, holm, sign_flip_p, smallest_possible_p
+from harness.compare.significance import (
+    SignificanceResult,
+    decide_verdicts,
+    holm,
+    sign_flip_max_p,
+    sign_flip_p,
+    smallest_possible_p,
+)
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 
@@ -23,6 +30,21 @@ def test_p_is_the_share_of_flips_as_far_from_zero(count: int, rng: np.random.Gen
     for shift in (0.0, 0.5, 3.0):
         difference = rng.normal(size=count) + shift
         assert sign_flip_p(difference) == pytest.approx(by_hand(difference), abs=1e-12)
+
+
+@pytest.mark.parametrize("count", [6, 17])
+def test_the_corrected_p_of_lines_with_common_flips(count: int, rng: np.random.Generator) -> None:
+    lines = [rng.normal(size=count), rng.normal(size=count) + 1.0, np.zeros(count), 100.0 + rng.normal(size=count)]
+    corrected = sign_flip_max_p(lines)
+    alone = [sign_flip_p(line) for line in lines]
+    assert sign_flip_max_p(lines[1:2]) == pytest.approx(alone[1:2])
+    assert all(p >= each - 1e-12 for p, each in zip(corrected, alone, strict=True))
+    assert corrected[2] == 1.0
+    assert corrected[3] == pytest.approx(
+        alone[3]
+    )  # of the largest statistic: 2/64 of six units, which Holm would double
+    again = sign_flip_max_p([10.0 * line for line in lines])
+    assert again == pytest.approx(corrected)
 
 
 @pytest.mark.parametrize(

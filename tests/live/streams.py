@@ -9,7 +9,7 @@ from harness.stream import TrackerFrame
 
 
 class Paced:
-    """A `TrackerStream` of given frames, stamped on delivery by default; it then waits for `close`, or ends."""
+    """A `TrackerStream` of given frames, stamped on delivery; it then waits for `close`, or ends."""
 
     def __init__(
         self,
@@ -17,18 +17,17 @@ class Paced:
         period_s: float = 0.0,
         *,
         ends: bool = True,
-        stamped: bool = True,
         stations: tuple[str, ...] = ("a", "b"),
     ) -> None:
         self.stations = stations
-        self._frames, self._period_s, self._ends, self._stamped = frames, period_s, ends, stamped
+        self._frames, self._period_s, self._ends = frames, period_s, ends
         self.closed = threading.Event()
 
     def __iter__(self) -> Iterator[TrackerFrame]:
         for frame in self._frames:
             if self.closed.wait(self._period_s):
                 return
-            yield replace(frame, received_s=time.monotonic()) if self._stamped else frame
+            yield replace(frame, received_s=time.monotonic())
         if not self._ends:
             self.closed.wait()
 

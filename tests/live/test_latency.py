@@ -51,20 +51,6 @@ def test_the_oldest_gives_way_and_is_counted() -> None:
     assert queue.take() is None  # for ever
 
 
-def test_what_waits_can_be_let_go() -> None:
-    queue: DroppingQueue[int] = DroppingQueue(3)
-    queue.put(1)
-    queue.put(2)
-    queue.drop_all()
-    assert queue.dropped == 2
-    queue.put(3)
-    assert queue.take() == 3
-    queue.put(4)
-    queue.end()
-    queue.drop_all()
-    assert (queue.dropped, queue.take()) == (3, None)
-
-
 def test_between_threads_nothing_is_lost_but_what_is_counted() -> None:
     queue: DroppingQueue[int] = DroppingQueue(5)
     taken: list[int] = []

@@ -5,22 +5,18 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from harness.body import build_body, tpose
-from harness.calibrate import Notifier, TPoseCalibrator, UnusableHold
 from harness.commands import live_summary
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
-from harness.core.motion import BodyMotion
 from harness.experiment import Playback, prepare_playback
 from harness.live.pose import LivePose
 from harness.live.scheduling_jitter import JitterProbe
 from harness.live.session import LiveOptions, LiveResult, run_session, warm_up
-from harness.simulate import simulate_tracker
 from harness.stream import TrackerFrame, TrackerStream
 from tests.live.posing import frame
 from tests.live.streams import Broken, Paced
@@ -92,7 +88,7 @@ def frames(count: int) -> list[TrackerFrame]:
 def test_every_frame_becomes_a_pose_when_there_is_time() -> None:
     stream, method, output = Paced(frames(20), 0.005), Counting(), Kept()
     done = performed(stream, method, output, plan=LiveOptions(100.0, queue_frames=100))
-    assert (done.captured, done.poses, done.dropped, done.frames_before) == (20, 20, 0, 0)
+    assert (done.captured, done.poses, done.dropped) == (20, 20, 0)
     assert [float(f.measured_s[0]) for f in method.seen] == [n / 100.0 for n in range(20)]
     assert [pose.number for pose in output.poses] == list(range(20))
     assert all(p.frame.received_s <= p.taken_s <= p.ready_s for p in output.poses)
@@ -165,83 +161,10 @@ def test_any_error_of_an_output_leaves_it_out() -> None:
     assert said == ["kept: ValueError: the library failed; the session goes on without it"]
 
 
-class AfterTwo:
-    """A calibrator that needs a given number of frames."""
-
-    def __init__(self) -> None:
-        self.frames = 0
-
-    def begin(self, say: Notifier) -> None:
-        say("stand still")
-
-    def add(self, frame: TrackerFrame, say: Notifier) -> Calibration | None:
-        self.frames += 1
-        return WORN if self.frames == 2 else None
-
-
-def test_calibration_comes_before_the_first_pose() -> None:
-    said: list[str] = []
-    method = Counting()
-    done = run_session(
-        Paced(frames(10), 0.01), BODY, method, AfterTwo(), [], LiveOptions(100.0, queue_frames=99), say=said.append
-    )
-    assert said == ["stand still"]
-    assert method.worn is WORN
-    assert done.frames_before >= 2
-    assert done.frames_before + done.poses == 10
-    assert run_session(Paced(frames(1)), BODY, Counting(), AfterTwo(), [], PLAN, say=said.append).poses == 0
-    assert said[-1] == "calibration: the stream ended before it was done"
-
-
 @pytest.fixture(scope="module")
 def worn(tmp_path_factory: pytest.TempPathFactory) -> Playback:
     scenario = write_long_demo(tmp_path_factory.mktemp("scenario"))
     return prepare_playback(scenario, clip="boxing_p1_01", noise="clean")
-
-
-def test_nobody_in_t_pose_is_told_so(worn: Playback) -> None:
-    said: list[str] = []
-    boxing = worn.simulation.frames
-    standing = TPoseCalibrator(worn.body, worn.scenario.nominal_mounts, attempts=2)
-    recorded, plan = Paced(boxing, stamped=False), LiveOptions(40.0, queue_frames=9999, host_timestamps=False)
-    with pytest.raises(UnusableHold):
-        run_session(recorded, worn.body, Counting(), standing, [], plan, say=said.append)
-    assert said[0].startswith("calibration: stand in T-pose")
-    assert "Trying again" in said[1]
-    assert len(said) == 2
-
-
-def test_a_t_pose_is_calibrated_from(worn: Playback) -> None:
-    from harness.reconstruct import make_method
-
-    upright = tpose(worn.body.skeleton)
-    take = BodyMotion("stand", "p1", "test", "", 40.0, np.tile(upright, (200, 1)))
-    noise = worn.scenario.noise_model
-    standing = simulate_tracker(worn.body, take, worn.scenario.nominal_mounts, worn.tracker, noise, seed=1).frames
-    output, said = Kept(), list[str]()
-
-    def stands() -> Iterator[TrackerFrame]:
-        """Repeats the frames until there are poses, since the time for calibration depends on the computer."""
-        yield from standing
-        for n in range(1, 100_000):
-            if len(output.poses) > 5:
-                return
-            last = standing[-1]
-            yield replace(last, received_s=last.received_s + n / 40.0, measured_s=last.measured_s + n / 40.0)
-
-    run_session(
-        Paced(stands(), 0.005, stamped=False, stations=worn.calibration.stations),
-        worn.body,
-        worn.clip_evaluation.fit_method(make_method("ik:previous"), "ik:previous"),
-        TPoseCalibrator(worn.body, worn.scenario.nominal_mounts),
-        [output],
-        LiveOptions(40.0, queue_frames=999, host_timestamps=False),
-        say=said.append,
-    )
-    assert said[1].startswith("calibration: done")
-    assert output.poses
-    for pose in output.poses:
-        np.testing.assert_allclose(pose.root_m, upright[:3], atol=0.03)
 
 
 def test_live_estimates_are_those_of_a_run(worn: Playback) -> None:

@@ -159,6 +159,7 @@ def test_nobody_knows_where_a_lost_or_lying_performer_faces(start: Callable[[Tur
     lying = np.array(tpose(BODY.skeleton))
     lying[3:7] = rotations.exp(np.array([0.0, 1.5, 0.0]))
     assert UNTURNED.forward(lying) is None
+    assert UNTURNED.forward(np.full(55, np.nan)) is None
 
 
 def test_another_calibration_is_used_from_the_next_frame_on(start: Callable[[Turned], Running]) -> None:

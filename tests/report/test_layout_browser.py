@@ -17,7 +17,7 @@ from harness.report.lab.validation_page import validation_page
 from harness.report.paper.page import write_paper_page
 from harness.report.physics.error_comparison import ErrorModelComparison
 from harness.report.physics.page import write_physics_page
-from harness.report.placement import page as placement_page
+from harness.report.placement.page import write_placement_page
 from harness.report.run.page import write_run_page
 from harness.report.sweep.page import write_sweep_page
 from harness.results.findings import TrustFindings
@@ -38,6 +38,30 @@ BEYOND = """(width) => [...document.querySelectorAll("body *")]
 SCROLLING = """() => [...document.querySelectorAll(".wide")].filter((box) => box.checkVisibility())
   .map((box) => [box.scrollWidth > box.clientWidth + 2, box.nextElementSibling.checkVisibility()])"""
 
+SMALLEST_PX, LARGEST_BYTES, SCREEN_PX = 11.0, 1_500_000, 900
+TEXT_SIZES = """() => {
+  const sizes = [], words = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (words.nextNode()) {
+    const element = words.currentNode.parentElement, drawn = element.closest("svg");
+    const unseen = element.closest("script, style, title, option, noscript") || !element.checkVisibility();
+    if (unseen || !words.currentNode.data.trim()) continue;
+    const scale = drawn ? Math.hypot(element.getScreenCTM().a, element.getScreenCTM().b) : 1;
+    sizes.push([scale * parseFloat(getComputedStyle(element).fontSize), words.currentNode.data.trim()]);
+  }
+  for (const image of document.images) {
+    if (!image.src.startsWith("data:image/svg+xml;base64,") || !image.checkVisibility()) continue;
+    const bytes = Uint8Array.from(atob(image.src.split(",")[1]), (letter) => letter.charCodeAt(0));
+    const svg = new DOMParser().parseFromString(new TextDecoder().decode(bytes), "image/svg+xml").documentElement;
+    const scale = image.getBoundingClientRect().width / svg.viewBox.baseVal.width;
+    for (const text of svg.querySelectorAll("text")) {
+      const size = text.getAttribute("style").match(/font(?:-size)?:[^;]*?([0-9.]+)px/)[1];
+      sizes.push([scale * parseFloat(size), text.textContent]);
+    }
+  }
+  return sizes;
+}"""
+"""Size of each text of a page [px], also of those in pictures, and the text."""
+
 
 @pytest.fixture(scope="module")
 def pages(
@@ -55,9 +79,7 @@ def pages(
     plan = Plan(behaviours=("walking", "boxing"), methods=methods, failing=("ik",))
     (folder / "placement").mkdir()
     shutil.copy(placement_study / "findings.json", folder / "placement")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(placement_page, "draw_body_map", lambda *args, **options: (None, "not in this test"))
-        placement = placement_page.write_placement_page(folder / "placement")
+    placement = write_placement_page(folder / "placement")
     shown = {
         "coverage": coverage_page(coverages[1]),
         "unit": unit_page(unit_with_faults, "harness characterize"),
@@ -106,4 +128,36 @@ def test_nothing_is_cut_in_print(browser: Any, pages: dict[str, Path], kind: str
     assert page.evaluate(BEYOND, PRINTED_PX) == []
     assert not any(scrolls for scrolls, _ in page.evaluate(SCROLLING))
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    page.close()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_page_is_small_and_its_first_screen_has_verdict_and_picture(
+    browser: Any, pages: dict[str, Path], kind: str
+) -> None:
+    assert pages[kind].stat().st_size <= LARGEST_BYTES
+    page = browser.new_page(viewport={"width": 1400, "height": SCREEN_PX})
+    page.goto(pages[kind].as_uri())
+    assert page.evaluate(
+        "[...document.querySelector('header').children].slice(0, 2).map((each) => each.className || each.tagName)"
+    ) == [
+        "kicker",
+        "H1",
+    ]
+    verdict = page.locator("h1").bounding_box()
+    picture = page.locator("header figure").first.bounding_box()
+    assert 0 < verdict["y"] < verdict["y"] + verdict["height"] <= picture["y"] + 1
+    assert picture["y"] <= 0.5 * SCREEN_PX
+    assert picture["width"] >= 300
+    page.close()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_text_is_smaller_than_11_pixels_on_a_narrow_screen(browser: Any, pages: dict[str, Path], kind: str) -> None:
+    page = browser.new_page(viewport={"width": 700, "height": SCREEN_PX})
+    page.goto(pages[kind].as_uri())
+    page.evaluate(UNFOLD)
+    sizes = page.evaluate(TEXT_SIZES)
+    assert len(sizes) > 30
+    assert [(size, text) for size, text in sizes if size < SMALLEST_PX] == []
     page.close()

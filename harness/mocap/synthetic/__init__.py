@@ -7,6 +7,7 @@ from harness.core.door import lazy_names
 if TYPE_CHECKING:
     from harness.mocap.synthetic.performers import (
         REFERENCE_PERFORMERS,
+        UNLISTED_PERFORMERS,
         performer_names,
         performer_skeleton,
         sample_skeletons,
@@ -28,6 +29,7 @@ __all__ = [
     "REFERENCE_PERFORMERS",
     "RIG_TAKES",
     "SOURCE",
+    "UNLISTED_PERFORMERS",
     "generate",
     "generate_rig",
     "performer_names",

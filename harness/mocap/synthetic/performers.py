@@ -23,6 +23,8 @@ from harness.mocap.synthetic.curves import smooth_noise
 from harness.mocap.synthetic.style import Style, sample_style
 
 _NAMES = tuple(f"p{number}" for number in range(1, 65))
+UNLISTED_PERFORMERS = tuple(f"p{number}" for number in range(65, 129))
+"""Performers that no list of takes names: what was chosen on the others is tested on them."""
 REFERENCE_PERFORMERS = _NAMES[:8]
 """The performers of tables, placement studies and databases of benchmarks. Their style is neutral."""
 _STATURE_STD = 0.035
@@ -75,7 +77,7 @@ class Habits:
 
 
 def performer_names() -> tuple[str, ...]:
-    """Names of the performers, which are part of the names of takes."""
+    """Names of the performers in lists, which are part of the names of takes."""
     return _NAMES
 
 
@@ -158,7 +160,7 @@ def _sample_posture(rng: np.random.Generator, size: float) -> dict[str, tuple[fl
 
 
 def _performer_rng(performer: str, what: str) -> np.random.Generator:
-    if performer not in _NAMES:
+    if performer not in _NAMES and performer not in UNLISTED_PERFORMERS:
         raise UnknownName("performer", performer, _NAMES)
     return generator(0, "performer", performer, what)
 

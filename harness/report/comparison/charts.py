@@ -101,7 +101,7 @@ def _draw_differences(axes: Axes, line: Difference, difference: Floats) -> None:
     axes.plot([1.0], [line.difference], "D", color=PAPER, markeredgecolor=INK, markeredgewidth=1.6, markersize=5.5)
     axes.set_xlim(-0.6, 1.65)
     axes.set_xticks([0.0, 1.0], ["clips", f"mean\n{format_signed(line, line.difference)}"])
-    axes.set_title("B − A", fontsize=9, fontweight="normal", pad=3.0)
+    axes.set_title("B − A", fontsize=9.5, fontweight="normal", pad=3.0)
     axes.yaxis.set_major_locator(MaxNLocator(4))
     axes.tick_params(labelsize=9, length=0)
     axes.grid(False)

@@ -22,7 +22,7 @@ _COLOURS = "viridis"
 _ARM_ANGLE_RAD = np.deg2rad(62.0)
 """Angle by which the arms hang below the horizontal."""
 _ARM_BONES = ("humerus", "radius", "wrist", "hand")
-_DISC_M, _AROUND = 0.036, np.linspace(0.0, 2.0 * np.pi, 41)
+_DISC_M, _AROUND = 0.036, np.linspace(0.0, 2.0 * np.pi, 19)
 _ALONG, _END_ALONG = {"clavicle": 0.5}, {"hand": 2.2, "foot": 2.2}
 """Where joint and far end of a bone are drawn, as a share of the bone; 0 and 1 for the others. Clavicles and neck share
 a joint; wrist and ankle would cover the ends of hand and foot."""
@@ -79,14 +79,14 @@ def joint_titles(groups: Sequence[BodyGroup], names: Mapping[str, str]) -> dict[
 def _draw_body(axes: Axes, values: Mapping[str, float], group: BodyGroup, colours: "ScalarMappable", body: int) -> None:
     from matplotlib.patches import Circle, Polygon
 
-    for outline in _outlines():
+    for outline in body_outlines():
         axes.add_patch(Polygon(outline, facecolor=GRID, edgecolor="none"))
     faces = np.asarray(colours.to_rgba(np.array(list(values.values()))))
     for n, bone in enumerate(values):
         style = {"facecolor": faces[n], "edgecolor": PAPER, "linewidth": 0.8}
         axes.add_patch(Circle(_place(bone, group.at_far_end), _DISC_M, gid=f"joint-{body}-{n}", **style))
     for across, side in ((-0.6, "right"), (0.6, "left")):
-        axes.text(across, 0.7, side, ha="left" if across < 0.0 else "right", color=FAINT, fontsize=8.5)
+        axes.text(across, 0.7, side, ha="left" if across < 0.0 else "right", color=FAINT, fontsize=9.5)
     axes.set_xlim(-0.62, 0.62)
     axes.set_ylim(-1.03, 0.84)
     axes.set_aspect("equal")
@@ -95,7 +95,7 @@ def _draw_body(axes: Axes, values: Mapping[str, float], group: BodyGroup, colour
 
 def _place(bone: str, at_far_end: bool) -> tuple[float, float]:
     """Where a joint is drawn, seen from the front: the body's left side is on the right [m]."""
-    skeleton, pose = standard_skeleton(), _standing()
+    skeleton, pose = standard_skeleton(), standing_pose()
     index = skeleton.index(bone)
     start, end = pose.start_m[0, index], pose.end_m[0, index]
     share = _END_ALONG.get(bone[1:], 1.0) if at_far_end else _ALONG.get(bone[1:], 0.0)
@@ -104,7 +104,7 @@ def _place(bone: str, at_far_end: bool) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=1)
-def _standing() -> Pose:
+def standing_pose() -> Pose:
     """The standard body with its arms hanging, its root at the origin."""
     skeleton = standard_skeleton()
     world_from_bone = np.tile(np.eye(3), (1, len(skeleton.names), 1, 1))
@@ -116,13 +116,13 @@ def _standing() -> Pose:
 
 
 @lru_cache(maxsize=1)
-def _outlines() -> tuple[Floats, ...]:
+def body_outlines() -> tuple[Floats, ...]:
     """(N, 2) outline of each part of the body, seen from the front [m]."""
     return tuple(_each_outline())
 
 
 def _each_outline() -> Iterator[Floats]:
-    skeleton, pose = standard_skeleton(), _standing()
+    skeleton, pose = standard_skeleton(), standing_pose()
     for geom in body_geoms(skeleton):
         if geom.bone == "root":
             start_m, turn = np.zeros(3), np.eye(3)
@@ -133,7 +133,7 @@ def _each_outline() -> Iterator[Floats]:
 
 
 def project_outline(geom: BodyGeom, world_from_bone: Floats) -> Floats:
-    """(41, 2) outline of a geom seen along x, about its centre [m]."""
+    """(19, 2) outline of a geom seen along x, about its centre [m]."""
     axes = world_from_bone @ rotations.to_matrix(geom.bone_from_shape)
     circle = np.stack([np.cos(_AROUND), np.sin(_AROUND)], axis=1)
     if geom.kind == "capsule":

@@ -14,9 +14,9 @@ from harness.core.working_folder import plain_import
 from harness.report.kit.inline_svg import describe_plots, mark_series
 from harness.report.kit.style import INK, SETTINGS, Axes, Chart, Figure, legend_scale, to_png, to_svg
 
-_WIDTH_IN = 8.6
+_WIDTH_IN = 7.6
 """Width of a chart as wide as the page [in]."""
-_LETTERS, _HANDLE_LETTERS, _ROW_IN = 105, 9, 0.2
+_LETTERS, _HANDLE_LETTERS, _ROW_IN = 93, 9, 0.2
 """Legend sizes: width of the page and of a line's sign with margins [average letters]; height of a row [in]."""
 _MOST_POINTS = 1500
 """Points of one line; more do not look sharper on a screen."""

@@ -14,20 +14,14 @@ from harness.report.kit.style import Axes, Figure
 
 _REFERENCES = re.compile(r'(?:href="#|url\(#)([^")]+)')
 _IDS = re.compile(r' id="([^"]*)"')
-_PATHS = re.compile(r'\bd="[^"]*"')
-_DECIMALS = re.compile(r"(\.\d\d)\d+")
 _METADATA = re.compile(r"<metadata>.*?</metadata>|<style type=\"text/css\">\*\{[^}]*\}</style>", re.DOTALL)
 DATA_PREFIX = "data:"
 """Elements whose gid begins so get data attributes: "data:series=3,plot=0" becomes data-series and data-plot."""
 
 
 def inline_svg(svg: str, alt: str, titles: Mapping[str, str]) -> Markup:
-    """The `<svg>` element with an alternative text, and a title for the elements of some gids, shown on hover.
-
-    Coordinates of paths are rounded to 0.01 pt.
-    """
+    """The `<svg>` element with an alternative text, and a title for the elements of some gids, shown on hover."""
     text = _METADATA.sub("", svg[svg.index("<svg") :])
-    text = _PATHS.sub(lambda match: _DECIMALS.sub(r"\1", match[0]), text)
     for gid, title in titles.items():
         text = text.replace(f'<g id="{gid}">', f"<g><title>{html.escape(title)}</title>", 1)
     kept = set(_REFERENCES.findall(text))

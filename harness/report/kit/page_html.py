@@ -64,15 +64,43 @@ class _Renderer:
         if page.verdict:
             word, outcome = page.verdict
             heading = join(tag("span", word, class_=f"big {to_file_name(outcome.word)}"), page.headline)
+        picture, sections = self._lift_picture(page)
         return html_document(
             title=f"{page.name}: harness {page.verb}" if page.name else f"harness {page.verb}",
             kicker=f"harness {page.verb}" + (f" · {page.name}" if page.name else ""),
             heading=heading,
             facts={title: text for title, text in page.facts.items() if text},
             missing=page.missing,
-            sections=[(s.title, s.name, self.blocks(s.blocks, s.title)) for s in (*page.sections, made_by)],
-            lead=self.blocks(page.lead, page.name) or None,
+            sections=[(s.title, s.name, self.blocks(s.blocks, s.title)) for s in (*sections, made_by)],
+            lead=self.blocks([block for block in page.lead if not isinstance(block, DataTable)], page.name) or None,
+            picture=picture,
+            tables=self.blocks([block for block in page.lead if isinstance(block, DataTable)], page.name) or None,
         )
+
+    def _lift_picture(self, page: Page) -> tuple[Markup | None, Sequence[Section]]:
+        """The first chart of the sections, for the first screen, and the sections without it.
+
+        None for a page whose lead has a picture of its own, and without charts.
+        """
+        if not self._with_charts or any(isinstance(block, Drawing | BrowserOnly) for block in page.lead):
+            return None, page.sections
+        for at, section in enumerate(page.sections):
+            for n, block in enumerate(section.blocks):
+                if isinstance(block, Panels) and block.charts and (chart := block.charts[0][1]()):
+                    return chart_panel(chart, block.charts[0][0]), page.sections
+                chart = self._chart(block) if isinstance(block, Drawing) else None
+                if isinstance(block, Drawing) and chart:
+                    rest = [*section.blocks[:n], replace(block, chart=lambda: None), *section.blocks[n + 1 :]]
+                    lifted = replace(section, blocks=rest)
+                    return chart_figure(chart), [*page.sections[:at], lifted, *page.sections[at + 1 :]]
+        return None, page.sections
+
+    def _chart(self, block: Drawing) -> Chart | None:
+        """The chart of a drawing, which is also written to the folder of plots."""
+        chart = (block.chart if isinstance(block.chart, Chart) else block.chart()) if self._with_charts else None
+        if chart and self._plots is not None:
+            chart.write(self._plots)
+        return chart
 
     def blocks(self, blocks: Sequence[Block | Markup], label: str) -> Markup:
         several = sum(isinstance(block, Drawing) for block in blocks) > 1
@@ -109,12 +137,9 @@ class _Renderer:
 
     def _drawing(self, block: Drawing, label: str, level: int) -> Markup:
         numbers = join(*(page_table(table, label) for table in block.tables))
-        draw = block.chart
-        chart = (draw if isinstance(draw, Chart) else draw()) if self._with_charts else None
+        chart = self._chart(block)
         if chart is None:
             return numbers
-        if self._plots is not None:
-            chart.write(self._plots)
         figure = chart_figure(chart, level if block.level is None else block.level)
         return join(figure, details(block.fold, numbers) if numbers else None)
 

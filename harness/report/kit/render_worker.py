@@ -30,12 +30,13 @@ class Scene:
         self, true_skeleton: Skeleton, estimated_skeleton: Skeleton, size: tuple[int, int], heading_rad: float
     ) -> None:
         """`size` is width and height [px]; `heading_rad` is where the body faces and places the camera."""
-        self._stage = RenderScene(size, heading_rad)
-        self._truth = BodyMesh(self._stage.plotter, true_skeleton, TRUTH, girth=1.0, opacity=0.3)
-        self._estimate = BodyMesh(self._stage.plotter, estimated_skeleton, ESTIMATE, girth=0.5, opacity=1.0)
+        self._stage = RenderScene(size, heading_rad, transparent=True)
+        plotter = self._stage.plotter
+        self._truth = BodyMesh(plotter, true_skeleton, TRUTH, girth=1.0, opacity=0.3, shadow=False)
+        self._estimate = BodyMesh(plotter, estimated_skeleton, ESTIMATE, girth=0.5, opacity=1.0, shadow=False)
 
     def picture(self, truth: PoseSequence, estimate: PoseSequence, frame: int) -> np.ndarray:
-        """Picture (height, width, 3) of one frame of both motions, 8 bit."""
+        """Picture (height, width, 4) of one frame of both motions on transparent ground, 8 bit."""
         _move(self._truth, truth, frame)
         _move(self._estimate, estimate, frame)
         self._stage.follow(truth.root_m[frame])
@@ -82,7 +83,7 @@ def write_strip(truth: PoseSequence, estimate: PoseSequence, size: tuple[int, in
 
 
 def _pictures(truth: PoseSequence, estimate: PoseSequence, size: tuple[int, int]) -> Iterator[Floats]:
-    """Rendered frames, (height, width, 3) bytes each."""
+    """Rendered frames, (height, width, 4) bytes each."""
     scene = Scene(truth.skeleton, estimate.skeleton, size, rotations.mean_heading_rad(truth.world_from_root))
     try:
         for frame in range(len(truth.root_m)):

@@ -75,7 +75,9 @@ PRINT_SETTINGS: dict[Any, Any] = {
     "svg.fonttype": "path",  # looks the same on a machine without the font
 }
 """Settings of figures for papers: text of 7 to 8 pt at the final size, fonts in the file."""
-_NOTE_SHARE = 0.875
+_PLACES, _DECIMALS = re.compile(r'\b(?:d|x|y)="[^"]*"|translate\([^)]*\)'), re.compile(r"(\.\d\d)\d+")
+"""Coordinates of an SVG, and numbers with more than two decimals."""
+_NOTE_SHARE = 0.95
 
 
 @dataclass(frozen=True)
@@ -103,13 +105,14 @@ class Chart:
             (folder / f"{self.name}.png").write_bytes(self.png)
 
     def for_screen(self) -> str:
-        """The SVG with colours of ink and grid that follow the reader's light or dark screen."""
-        text, light, dark = self.svg, "", ""
+        """The SVG with colours of ink and grid that follow the reader's light or dark screen, rounded to 0.01 pt."""
+        text, light, dark = _PLACES.sub(lambda match: _DECIMALS.sub(r"\1", match[0]), self.svg), "", ""
         for n, (colour, on_dark) in enumerate(_DARK.items()):
             text = text.replace(colour, f"var(--c{n})")
             light += f"--c{n}:{colour};"
             dark += f"--c{n}:{on_dark};"
-        text = re.sub(r"(font:[^;\"']*?px) [^;\"]*", r"\1 system-ui, sans-serif", text)
+        text = re.sub(r"(font:[^;\"']*?px|font-family:) [^;\"]*", r"\1 system-ui, sans-serif", text)
+        text = re.sub(r' transform="rotate\(-0 [^)]*\)"|(?<=\n) +', "", text)
         rules = f"svg{{{light}}}@media screen and (prefers-color-scheme: dark){{svg{{{dark}}}}}"
         return text.replace("<defs>", f"<style>{rules}</style><defs>", 1)
 

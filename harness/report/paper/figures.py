@@ -125,7 +125,7 @@ def _draw_number(axes: Axes, text: str, along: float, tip: float, off: int, hori
         textcoords="offset points",
         ha="left" if horizontal else "center",
         va="center_baseline" if horizontal else "bottom",
-        fontsize=8,
+        fontsize=9.5,
         color=INK,
     )
 

@@ -1,230 +1,146 @@
-"""The body map: skin coloured by the contribution of a station there, from the front and from behind.
+"""The body map: the recommended set on the body, and what a station at each place contributes.
 
-Skin takes the colour of places on its own bone only; a bone on which no place was tried stays grey. The body is
-rendered in a separate process. Labels, lines and colour bar are drawn around it and follow the reader's screen colours.
+A disc is as large as the contribution; one that cannot be told from zero is pale. Labels stand left and right of the
+body, where nothing covers them.
 """
 
-from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from harness.core.arrays import Floats
 from harness.core.number_format import format_fixed
-from harness.core.progress import report_step
-from harness.core.working_folder import plain_import
-from harness.errors import MissingExtra
 from harness.report.kit.chart import draw_chart, spread_positions
-from harness.report.kit.render_process import finish_renderer, start_renderer
-from harness.report.kit.style import FAINT, INK, Axes, Chart, Figure
+from harness.report.kit.style import COLOURS, FAINT, INK, MUTED, Axes, Chart, Figure
+from harness.report.placement.body_view import HIGH_M, LOW_M, draw_outline, draw_ring, draw_station, locate_places
+from harness.report.placement.told_apart import TOLD_NOTE, largest_group, told_from_zero
 from harness.report.placement.wording import plain_name
-from harness.results.findings import CandidatePlace, MarginalContribution, StationNames
+from harness.results.findings import CandidatePlace, PlacementFindings, StationNames
 
-_COLOURS = "viridis"
-_SOFTENING_M = 0.02
-"""Radius of a ball [m]; within this distance the weight of a place hardly grows."""
-_TIMEOUT_S = 120.0
-"""Time allowed for rendering [s]."""
-_HEIGHT_IN, _MOST_NAMED, _GAP = 4.9, 18, 0.048
-"""Height of the chart [in]; most places with names, those with the largest contributions; distance of two names, as a
-share of the picture's height."""
-_TOP, _ARMS, _TRUNK, _OUTER = 0.04, (0.145, 0.34), 0.12, 0.25
-_NECK = 0.17
-"""Shares of the picture: height of the first name; limits of the arms' height; half of the trunk's width; distance of
-hands and forearms from the edge; height of the neck."""
-CandidateValues = Mapping[str, float | None]
-"""Candidate -> its contribution; None where it was not measured."""
+HELPS, HARMS, PALE = COLOURS[1], COLOURS[0], MUTED
+_WIDTH_IN, _HEIGHT_IN = 7.4, 3.9
+_MOST_NAMED, _LINE_M, _HALF_WIDTH_M = 18, 0.105, 1.06
+"""Most places with names; height of a line of text and half of the width of a view [m]."""
+_WAYS = {
+    "ablate": "error without it minus error with all {count} stations",
+    "add": "reduction of the error by one more station",
+    "exhaustive": "mean error of sets without it minus mean error of sets with it",
+}
+"""Mode -> what the contribution of a candidate is."""
+DrawDisc = Callable[[Axes, str, tuple[float, float]], None]
+"""Draws the disc of a place, by its name, at a point of a view [m]."""
 
 
-def draw_body_map(
-    places: Sequence[CandidatePlace],
-    values: CandidateValues,
-    description: str,
-    base: StationNames = (),
-    *,
-    unit: str,
-    number: int = 1,
-) -> tuple[Chart | None, str]:
-    """The chart and "", or None and the reason in one line why there is none.
+def body_map(findings: PlacementFindings, recommended: StationNames) -> Chart:
+    """The body from the front and from behind, with every candidate and the recommended set."""
+    rows = largest_group(findings.contributions)
+    values = {row.candidate: row.difference for row in rows if row.difference is not None}
+    told = told_from_zero(rows)
+    worn = {*findings.base, *(rows[0].base if rows and rows[0].mode == "add" else ())}
+    places = [p for p in findings.candidates if not p.moved_from or p.name in {*recommended, *worn}]
+    largest = max(map(abs, values.values()), default=0.0) or 1.0
 
-    `values` are contributions of candidates, measured in one way, which `description` says in words. Stations of `base`
-    are already worn: they have no value and are drawn as dark balls.
+    def draw_disc(axes: Axes, name: str, at: tuple[float, float]) -> None:
+        value = values.get(name)
+        if value is None:
+            is_marked = name in worn or name in recommended
+            draw_station(axes, at, INK if is_marked else PALE, hollow=not is_marked)
+        else:
+            colour = PALE if name not in told else HELPS if value > 0.0 else HARMS
+            draw_station(axes, at, colour, hollow=name not in told, scale=0.6 + 0.5 * abs(value) / largest)
+        if name in recommended:
+            draw_ring(axes, at)
 
-    Places that have no value and are not worn are left out. The chart needs pyvista and OpenGL.
-    """
-    shown_places = [place for place in places if place.name in base or values.get(place.name) is not None]
-    measured = [value for place in shown_places if (value := values.get(place.name)) is not None]
-    if not measured:
-        return None, "no candidate has a value"
-    if find_spec("pyvista") is None:
-        return None, str(MissingExtra("A rendered picture", "pyvista", "viz"))
-    low, high = min(0.0, *measured), max(0.0, *measured)
-    ends = (low, high if high > low else low + 1.0)
-    views, reason = render_body(shown_places, values, ends)
-    if views is None:
-        return None, reason
-    return _chart(shown_places, values, description, views, ends, unit, number), ""
-
-
-def render_body(
-    places: Sequence[CandidatePlace], values: CandidateValues, ends: tuple[float, float]
-) -> tuple[dict[str, np.ndarray] | None, str]:
-    """Pictures of both sides and the places on them (see `body_map_worker.main`), or None and the reason."""
-    report_step("rendered body")
-    with plain_import():
-        from matplotlib import colormaps
-
-    contributions, (low, high) = [values.get(place.name) for place in places], ends
-    shares = [0.0 if value is None else (value - low) / (high - low) for value in contributions]
-    with TemporaryDirectory(prefix="harness-report-") as folder:
-        job, output = Path(folder) / "job.npz", Path(folder) / "views.npz"
-        np.savez(
-            job,
-            bone=np.array([place.bone for place in places]),
-            along=np.array([place.along for place in places]),
-            around_rad=np.deg2rad([place.around_deg for place in places]),
-            stand_off_m=np.zeros(len(places)),
-            colour=colormaps[_COLOURS](shares)[:, :3],
-            known=np.array([value is not None for value in contributions]),
-        )
-        with start_renderer("harness.report.placement.body_map_worker", [str(job), str(output)]) as process:
-            reason = finish_renderer(process, _TIMEOUT_S)
-        if reason or not output.exists():
-            return None, reason or "the renderer wrote no picture"
-        with np.load(output, allow_pickle=False) as content:
-            return {name: content[name] for name in content.files}, ""
-
-
-def _chart(
-    places: Sequence[CandidatePlace],
-    known: CandidateValues,
-    description: str,
-    views: Mapping[str, np.ndarray],
-    ends: tuple[float, float],
-    unit: str,
-    number: int,
-) -> Chart:
-    values = {n: value for n, place in enumerate(places) if (value := known.get(place.name)) is not None}
-    order = sorted(values, key=lambda n: -values[n])
-    texts = {n: f"{plain_name(places[n].name)} {format_fixed(values[n], 2, signed=True)}" for n in order[:_MOST_NAMED]}
-    texts |= {n: f"{plain_name(place.name)} (worn)" for n, place in enumerate(places) if n not in values}
-
-    def draw(figure: Figure) -> None:
-        from matplotlib.cm import ScalarMappable
-        from matplotlib.colors import Normalize
-
-        grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 0.035))
-        at = views["at"]
-        for side, title in enumerate(("from the front", "from behind")):
-            axes = figure.add_subplot(grid[0, side])
-            axes.imshow(views["picture"][side], interpolation="none")
-            axes.set_axis_off()
-            axes.text(0.5, 0.0, title, transform=axes.transAxes, ha="center", va="top", color=FAINT)
-            visible = [n for n in texts if (at[1, n, 2] > at[0, n, 2] + 1e-6) == bool(side)]
-            label_places(axes, at[side], {n: texts[n] for n in visible}, views["picture"].shape[1:3])
-        bar = figure.add_subplot(grid[1, :])
-        figure.colorbar(ScalarMappable(Normalize(*ends), _COLOURS), cax=bar, orientation="horizontal")
-        bar.set_xlabel(f"{description} [{unit}]")
-        bar.grid(False)
-
-    most = (
-        f" Named: the {_MOST_NAMED} of {len(order)} places with the largest contributions."
-        if len(order) > _MOST_NAMED
-        else ""
+    first = {p.name: (p.name not in recommended, p.name not in told, -abs(values.get(p.name, 0.0))) for p in places}
+    named = sorted(first, key=lambda name: first[name])[:_MOST_NAMED]
+    notes = {name: format_fixed(value, 2, signed=True) for name, value in values.items()} | dict.fromkeys(worn, "worn")
+    texts = {name: f"{plain_name(name)}\n{notes[name]}" if name in notes else plain_name(name) for name in named}
+    what = _WAYS[rows[0].mode].format(count=len(rows[0].base)) if rows else ""
+    told_text = ", ".join(
+        f"{plain_name(name)} {notes[name]}{'' if name in told else ' (cannot be told from zero)'}"
+        for name in sorted(values, key=lambda name: -values[name])
     )
-    worn = " Dark balls: stations that are already worn." if len(values) < len(places) else ""
-    named = {places[n].name: value for n, value in values.items()}
-    has_pairs = any(
-        named.get(name.replace("left_", "right_", 1)) == value for name, value in named.items() if "left_" in name
-    )
-    pairs = " Both stations of a pair that is worn together have the pair's value." if has_pairs else ""
-    contributions = ", ".join(f"{plain_name(places[n].name)} {format_fixed(values[n], 2, signed=True)}" for n in order)
+    more = f" Named: {_MOST_NAMED} of {len(places)} places." if len(places) > _MOST_NAMED else ""
+    numbers = f"Numbers: {what} [{findings.unit}]. {TOLD_NOTE} " if what else ""
+    marks = {
+        (INK, "ring"): "recommended" if recommended else "",
+        (HELPS, "disc"): "error is lower with it" if any(values[name] > 0.0 for name in told) else "",
+        (HARMS, "disc"): "error is higher with it" if any(values[name] < 0.0 for name in told) else "",
+        (PALE, "pale"): "cannot be told from zero" if len(told) < len(values) else "" if values else "not recommended",
+    }
     return draw_chart(
-        f"body_map_{number}",
-        f"{description[0].upper()}{description[1:]}",
-        f"Balls: places that were tried, with their contribution [{unit}]. Skin has the colour of the places on its "
-        f"own bone, weighted by distance; no place was tried on grey bones.{worn}{pairs}{most} In the front view the "
-        "body's left side is on the right.",
-        f"The body coloured by {description}: {contributions} {unit}.",
-        draw,
+        "body_map",
+        "Where the stations are",
+        f"{numbers}In the front view the body's left side is on the right.{more}",
+        f"The body with the recommended stations {', '.join(map(plain_name, recommended)) or 'none'}"
+        + (f", and {what} [{findings.unit}]: {told_text}." if what else "."),
+        lambda figure: _draw_map(figure, places, texts, draw_disc, marks),
         _HEIGHT_IN,
+        width_in=_WIDTH_IN,
+        layout=None,
         raster=True,
     )
 
 
-def label_places(axes: Axes, at: Floats, texts: Mapping[int, str], size: tuple[int, int]) -> None:
-    """Write a name with a line to its ball for each place: above the arms, and in columns next to the rest."""
-    height, width = size
-    for right in (False, True):
-        members = [n for n in texts if bool(at[n, 0] > 0.5 * width) is right]
-        inwards = {n: 0.5 - abs(float(at[n, 0]) / width - 0.5) for n in members}
-        arms = [n for n in members if inwards[n] < 0.5 - _TRUNK and at[n, 1] < _ARMS[1] * height]
-        ends: dict[int, tuple[float, float, bool, float]] = {}
-        # Place -> distance from the edge of the picture, height, whether the name starts there, start of its line.
-        for k, n in enumerate(sorted(arms, key=lambda n: -inwards[n])):
-            down, outer = _ARMS[0] - _GAP * k, inwards[n] < _OUTER
-            ends[n] = (
-                (max(inwards[n] - 0.05, 0.01), down, True, 0.12) if outer else (inwards[n] + 0.09, down, False, 0.7)
-            )
-        rest = sorted((n for n in members if n not in arms), key=lambda n: (at[n, 1], at[n, 0]))
-        above = [n for n in rest if at[n, 1] < _NECK * height]
-        below = [n for n in rest if n not in above]
-        highest = min([_TOP, *(down - _GAP for _, down, *_ in ends.values())])
-        wanted = [max(float(at[n, 1]) / height, _ARMS[1] + _GAP * k) for k, n in enumerate(below)]
-        heights = [highest - _GAP * k for k in range(len(above))][::-1] + spread_positions(wanted, _GAP)
-        ends |= {n: (0.01, down, True, 1.0) for n, down in zip((*above, *below), heights, strict=True)}
-        for n, (across, down, begins, start) in ends.items():
+def draw_views(figure: Figure, places: Sequence[CandidatePlace], texts: Mapping[str, str], draw_disc: DrawDisc) -> None:
+    """Draw the body from the front and from behind, the discs of the places, and the texts of those that have one."""
+    at_m, outward = locate_places(places)
+    behind = outward[:, 0] < -0.5
+    for side, title in enumerate(("from the front", "from behind")):
+        axes = figure.add_axes((0.5 * side, 0.08, 0.5, 0.92))
+        draw_outline(axes, behind=bool(side), half_width_m=_HALF_WIDTH_M)
+        axes.text(0.0, LOW_M, title, ha="center", va="top", color=FAINT)
+        shown = np.flatnonzero(behind == bool(side)).tolist()
+        points = {places[n].name: ((-1.0 if side else 1.0) * float(at_m[n, 1]), float(at_m[n, 2])) for n in shown}
+        for name, at in points.items():
+            draw_disc(axes, name, at)
+        _label_places(axes, points, {name: texts[name] for name in points if name in texts})
+
+
+def _label_places(axes: Axes, points: Mapping[str, tuple[float, float]], texts: Mapping[str, str]) -> None:
+    """Write the text of each place in the column of its side, with a line to its disc; no two texts overlap."""
+    columns: tuple[list[str], list[str]] = ([], [])
+    for name in sorted(texts, key=lambda name: abs(points[name][0]), reverse=True):
+        across = points[name][0]
+        right = len(columns[0]) > len(columns[1]) if abs(across) < 0.02 else across > 0.0
+        columns[right].append(name)
+    for right, column in zip((False, True), columns, strict=True):
+        column.sort(key=lambda name: -points[name][1])
+        lines = max((1 + texts[name].count("\n") for name in column), default=1)
+        gap = lines * _LINE_M / (HIGH_M - LOW_M)
+        heights = spread_positions([(HIGH_M - points[name][1]) / (HIGH_M - LOW_M) for name in column], gap)
+        for name, height in zip(column, heights, strict=True):
             axes.annotate(
-                texts[n],
-                (float(at[n, 0]), float(at[n, 1])),
-                ((1.0 - across if right else across) * width, down * height),
-                arrowprops={
-                    "arrowstyle": "-",
-                    "color": FAINT,
-                    "linewidth": 0.8,
-                    "shrinkA": 1.0,
-                    "shrinkB": 5.0,
-                    "relpos": (1.0 - start if right else start, 0.0 if n in arms else 0.5),
-                },
-                ha="right" if right is begins else "left",
+                texts[name],
+                points[name],
+                ((1.0 if right else -1.0) * (_HALF_WIDTH_M - 0.02), HIGH_M - height * (HIGH_M - LOW_M)),
+                arrowprops={"arrowstyle": "-", "color": FAINT, "linewidth": 0.8, "shrinkA": 2.0, "shrinkB": 7.0}
+                | {"relpos": (0.0 if right else 1.0, 0.5)},
+                ha="right" if right else "left",
                 va="center",
-                fontsize=8.5,
-                color=INK,
+                linespacing=1.05,
                 annotation_clip=False,
             )
 
 
-def interpolate_colours(points_m: Floats, places_m: Floats, colours: Floats) -> Floats:
-    """(P, 3) colours of skin points (P, 3) [m], interpolated from places (N, 3) [m] with colours (N, 3).
+def _draw_map(
+    figure: Figure,
+    places: Sequence[CandidatePlace],
+    texts: Mapping[str, str],
+    draw_disc: DrawDisc,
+    marks: Mapping[tuple[str, str], str],
+) -> None:
+    from matplotlib.lines import Line2D
 
-    Weights are inverse squares of the distance (Shepard 1968, Proc. ACM National Conference).
-    """
-    distance_m = np.linalg.norm(points_m[:, None] - places_m, axis=2)
-    weight = 1.0 / (distance_m**2 + _SOFTENING_M**2)
-    out: Floats = (weight / weight.sum(axis=1, keepdims=True)) @ colours
-    return out
-
-
-def select_body_maps(contributions: Sequence[MarginalContribution]) -> list[tuple[CandidateValues, str, StationNames]]:
-    """The values, the description and the worn stations of each map to draw.
-
-    One compares candidates with each other, and one is of adding a station, if there are any.
-    """
-    groups: dict[tuple[str, StationNames], dict[str, float | None]] = {}
-    for contribution in contributions:
-        group = groups.setdefault((contribution.mode, contribution.base), {})
-        group[contribution.candidate] = contribution.difference
-    words = {
-        "ablate": "error without it minus error with all {count} stations",
-        "add": "reduction of the error by one more station",
-        "exhaustive": "mean error of sets without it minus mean error of sets with it",
+    draw_views(figure, places, texts, draw_disc)
+    looks: dict[str, dict[str, Any]] = {
+        "ring": {"markerfacecolor": "none", "markersize": 13.0, "markeredgewidth": 2.0},
+        "disc": {"markersize": 10.0},
+        "pale": {"markerfacecolor": "none", "markersize": 8.0, "markeredgewidth": 1.6},
     }
-    maps = [
-        (values, words[mode].format(count=len(base)), base if mode == "add" else ())
-        for (mode, base), values in sorted(groups.items(), key=lambda group: group[0][0] != "exhaustive")
-        if any(value is not None for value in values.values())
+    handles = [
+        Line2D([], [], linestyle="none", marker="o", color=colour, label=text, **looks[look])
+        for (colour, look), text in marks.items()
+        if text
     ]
-    kinds = [each for each in maps if not each[2]], [each for each in maps if each[2]]
-    return [max(kind, key=lambda each: len(each[0])) for kind in kinds if kind]
+    figure.legend(handles=handles, loc="lower center", ncols=len(handles), handletextpad=0.2, columnspacing=1.2)

@@ -11,6 +11,7 @@ from harness.report.kit.chart import draw_chart
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart, Figure, hide_frame
 from harness.report.kit.text import list_first, to_file_name
 from harness.report.placement.pareto import draw_pareto, mean_or_nan, measured_best
+from harness.report.placement.told_apart import TOLD_NOTE, told_from_zero
 from harness.report.placement.wording import (
     TIE_NOTE,
     contribution_label,
@@ -23,8 +24,8 @@ from harness.report.placement.wording import (
 from harness.results.findings import MarginalContribution, PlacementFindings, PlacementSearch, Ranking
 
 _BEST, _OTHER = COLOURS[1], COLOURS[0]
-_ROW_IN, _FRAME_IN, _MOST_ROWS = 0.24, 0.9, 20
-"""Heights of a row and of the frame [in]; most rows of a ranking."""
+_WIDTH_IN, _ROW_IN, _FRAME_IN, _MOST_ROWS = 7.4, 0.24, 0.9, 20
+"""Width of a chart, heights of a row and of the frame [in]; most rows of a ranking."""
 
 
 def pareto_chart(findings: PlacementFindings) -> Chart | None:
@@ -46,6 +47,7 @@ def pareto_chart(findings: PlacementFindings) -> Chart | None:
         f"Error against the number of stations; the best set of each size is {values}.",
         lambda figure: draw_pareto(figure, findings, f"{findings.metric} [{findings.unit}]"),
         4.2,
+        width_in=_WIDTH_IN,
         raster=True,
     )
 
@@ -69,11 +71,10 @@ def ranking_chart(findings: PlacementFindings, ranking: Ranking, number: int) ->
                 (1.01, y),
                 xycoords=("axes fraction", "data"),
                 va="center",
-                fontsize=8.5,
                 color=INK if row.tied else FAINT,
                 annotation_clip=False,
             )
-        axes.annotate("ranks", (1.01, 1.0), (0, 4), "axes fraction", "offset points", fontsize=8.5, color=FAINT)
+        axes.annotate("ranks", (1.01, 1.0), (0, 4), "axes fraction", "offset points", color=FAINT)
         label_rows(axes, [set_name(row.stations) for row in rows])
         axes.margins(x=0.06)
         axes.set_xlabel(f"difference to the first [{findings.unit}], paired over units")
@@ -88,18 +89,19 @@ def ranking_chart(findings: PlacementFindings, ranking: Ranking, number: int) ->
         f"{ranking.title}: {set_name(first.stations)} is first, {ties} sets are tied with it.",
         draw,
         _FRAME_IN + _ROW_IN * len(rows),
+        width_in=_WIDTH_IN,
     )
 
 
 def contribution_chart(findings: PlacementFindings, shown: Sequence[MarginalContribution], number: int) -> Chart:
     """The contribution of each candidate in one mode, the largest first."""
     rows = sorted((w for w in shown if w.difference is not None), key=lambda w: -(w.difference or 0.0))[:40]
-    title = contribution_label(findings, shown[0])
+    title, told = contribution_label(findings, shown[0]), told_from_zero(shown)
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
         for y, row in enumerate(rows):
-            significant = row.low is not None and row.high is not None and not row.low <= 0.0 <= row.high
+            significant = row.candidate in told
             colour = _BEST if significant and (row.difference or 0.0) > 0.0 else _OTHER if significant else FAINT
             axes.barh(y, row.difference or 0.0, 0.62, color=colour, alpha=0.85 if significant else 0.55)
             if row.low is not None and row.high is not None:
@@ -114,11 +116,12 @@ def contribution_chart(findings: PlacementFindings, shown: Sequence[MarginalCont
     return draw_chart(
         f"worth_{number}_{to_file_name(shown[0].mode)}",
         f"{title[0].upper()}{title[1:]}",
-        "Blue: sets with the station err less; orange: they err more; grey: neither is significant. Whiskers: 95 % "
-        "interval over units.",
+        f"Blue: sets with the station err less; orange: they err more. {TOLD_NOTE} Whiskers: 95 % interval over units, "
+        "not corrected.",
         f"Contribution of candidates, {title}: {values}.",
         draw,
         _FRAME_IN + _ROW_IN * len(rows),
+        width_in=_WIDTH_IN,
     )
 
 
@@ -152,6 +155,7 @@ def search_chart(findings: PlacementFindings, search: PlacementSearch) -> Chart:
         f"{search.mode}, {search.title}: {values}.",
         draw,
         _FRAME_IN + 1.3 * _ROW_IN * len(measured),
+        width_in=_WIDTH_IN,
     )
 
 
@@ -180,7 +184,7 @@ def stability_chart(findings: PlacementFindings) -> Chart:
             shade = colours(0.08 + 0.77 * float(np.clip(tau, 0.0, 1.0)))
             axes.add_patch(Rectangle((column - 0.48, row - 0.46), 0.96, 0.92, facecolor=shade, linewidth=0.0))
             ink = "#ffffff" if tau > 0.55 else "#1a1a1a"
-            axes.text(column, row, Interval(tau).number, ha="center", va="center", color=ink, fontsize=9)
+            axes.text(column, row, Interval(tau).number, ha="center", va="center", color=ink)
         axes.set_xlim(-0.5, max(len(names) - 0.5, 5.5))
         axes.set_ylim(len(names) - 0.5, -0.5)
         hide_frame(axes)
@@ -197,4 +201,5 @@ def stability_chart(findings: PlacementFindings) -> Chart:
         f"Kendall's tau between conditions: {values}.",
         draw,
         1.1 + 0.36 * len(names),
+        width_in=_WIDTH_IN,
     )

@@ -1,4 +1,4 @@
-"""The page of a placement study: recommended set, body map, error by number of stations, then every ranking."""
+"""The page of a placement study: advice, body map and curve of errors, tied sets, then every ranking."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -6,6 +6,8 @@ from pathlib import Path
 
 from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_fixed, format_share
 from harness.report.kit.chart import clear_plots
+from harness.report.kit.document import chart_figure
+from harness.report.kit.markup import Markup, tag
 from harness.report.kit.page import (
     Block,
     BrowserOnly,
@@ -23,10 +25,9 @@ from harness.report.kit.page import (
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import render_text
 from harness.report.kit.statement_lines import WIDTH
-from harness.report.kit.style import Chart
 from harness.report.kit.text import describe_motion_source, last_line
 from harness.report.paper.page import claims_table
-from harness.report.placement.body_map import draw_body_map, select_body_maps
+from harness.report.placement.body_map import body_map
 from harness.report.placement.charts import (
     contribution_chart,
     pareto_chart,
@@ -34,6 +35,8 @@ from harness.report.placement.charts import (
     search_chart,
     stability_chart,
 )
+from harness.report.placement.error_curve import curve_points, error_curve
+from harness.report.placement.set_bodies import second_method_blocks, tied_sets_blocks
 from harness.report.placement.wording import (
     TIE_NOTE,
     changes_sentence,
@@ -49,6 +52,8 @@ from harness.report.placement.wording import (
     search_gain_sentence,
     set_error,
     set_name,
+    size_sentences,
+    smallest_sufficient_set,
 )
 from harness.results.files import FINDINGS
 from harness.results.findings import (
@@ -59,26 +64,40 @@ from harness.results.findings import (
     PlacementSearch,
     RankAgreement,
     Ranking,
+    StationNames,
     read_placement,
 )
+from harness.results.findings.advice import HalvingRound
 
 _MOST_PRINTED, _MOST_FAILED, _MOST_RANKED = 12, 50, 40
+_LEARNT_FROM = {
+    "": "",
+    "known": "other takes of the performers on whom sets are tested",
+    "new": "other performers than those on whom sets are tested",
+}
+"""Split -> what methods learnt from."""
 
 
 def write_placement_page(folder: Path) -> Path:
     """Write FOLDER/plots and FOLDER/report.html of the study in `folder`; returns the path of the page.
 
-    Where the body map cannot be drawn the page says why. BadFile if there are no findings.
+    BadFile if there are no findings.
     """
     findings = read_placement(folder / FINDINGS)
     plots = clear_plots(folder)
-    maps = [
-        draw_body_map(findings.candidates, *shown, unit=findings.unit, number=number)
-        for number, shown in enumerate(select_body_maps(findings.contributions), start=1)
-    ]
-    missing = dict.fromkeys(f"The body map: {reason}" for chart, reason in maps if chart is None)
-    page = placement_page(findings, [chart for chart, _ in maps if chart], list(missing))
-    return write_page(page, folder / "report.html", plots)
+    pictures = [body_map(findings, recommended_set(findings)), *filter(None, [error_curve(findings)])]
+    for picture in pictures:
+        picture.write(plots)
+    widths = ("42rem", "30rem")
+    figures = [tag("div", chart_figure(c), style=f"max-width: {w}") for c, w in zip(pictures, widths, strict=False)]
+    overview = tag("div", *figures, class_="overview" if len(figures) > 1 else None)
+    return write_page(placement_page(findings, overview), folder / "report.html", plots)
+
+
+def recommended_set(findings: PlacementFindings) -> StationNames:
+    """The set that the study recommends; () where nothing was measured."""
+    best = findings.advice.best if findings.advice else smallest_sufficient_set(findings)
+    return best.stations if best else ()
 
 
 def placement_text(findings: PlacementFindings) -> str:
@@ -86,8 +105,8 @@ def placement_text(findings: PlacementFindings) -> str:
     return render_text(placement_page(findings), WIDTH)
 
 
-def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), missing: Sequence[str] = ()) -> Page:
-    """The page of a study, with its body maps."""
+def placement_page(findings: PlacementFindings, overview: Markup | None = None) -> Page:
+    """The page of a study, with the pictures of its first screen."""
     counts = f"{len(original_candidates(findings))} candidates, {len(findings.tried):,} sets of them"
     ways: dict[tuple[str, tuple[str, ...]], list[MarginalContribution]] = {}
     for contribution in findings.contributions:
@@ -95,11 +114,20 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
     measured = [rows for rows in ways.values() if any(row.difference is not None for row in rows)]
     drawings = [Drawing(partial(contribution_chart, findings, rows, n)) for n, rows in enumerate(measured, start=1)]
     several = len(findings.conditions) > 1
+    recommended, second = recommended_set(findings), second_method_blocks(findings)
+    disputed = findings.second is not None and any(
+        choice.worse and choice.chosen == recommended for choice in findings.second.choices
+    )
     return Page(
         verb="placement",
         name=findings.name,
         headline=placement_sentence(findings),
-        lead=[_best_table(findings)],
+        lead=[
+            *(second if disputed else []),
+            BrowserOnly([overview or Markup()]),
+            Bullets(size_sentences(findings)),
+            _best_table(findings),
+        ],
         facts={
             "Question": findings.title,
             "Metric": f"{findings.metric} [{findings.unit}], {findings.better} is better",
@@ -107,14 +135,19 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
             "Motion": f"{', '.join(findings.behaviours)}; {describe_motion_source(findings.motion)}",
             "Noise": findings.noise,
             "Link": findings.link or "the same rate for any number of stations",
+            "Worn in any case": set_name(findings.base) if findings.base else "",
+            "Costs": ", ".join(f"{plain_name(name)} {cost:g}" for name, cost in findings.station_costs.items()),
+            "Learnt from": _LEARNT_FROM[findings.split],
+            "Search": search_text(findings),
             "Clips": " ".join(power_sentences(findings.power)) if findings.power else "",
             "Tried": f"{counts}; {findings.planned:,} cells, {len(findings.failures)} failed",
             "Ties": TIE_NOTE,
             "Made by": f"{findings.command} (seed {findings.seed})",
         },
-        missing=missing,
         sections=[
-            Section("Body map", "body", [Drawing(chart) for chart in maps]),
+            Section("Tied sets", "ties", tied_sets_blocks(findings, recommended)),
+            Section("Second method", "second", [] if disputed else second),
+            Section("Sizes compared", "sizes", [_steps_table(findings)]),
             Section("Number of stations", "pareto", [Drawing(partial(pareto_chart, findings))]),
             Section("Published statements", "claims", [claims_table(findings.claims)]),
             Section("Rankings", "rankings", _rankings(findings)),
@@ -133,17 +166,31 @@ def placement_page(findings: PlacementFindings, maps: Sequence[Chart] = (), miss
     )
 
 
+def search_text(findings: PlacementFindings) -> str:
+    """The rounds of a search by halves: "a quick search; 2 stations: 28 sets on 4 units, 14 on 8"; "" without one."""
+    by_size: dict[int, list[HalvingRound]] = {}
+    for each in findings.rounds:
+        by_size.setdefault(each.size, []).append(each)
+    rounds = [
+        f"{count_noun(size, 'station')}: {of[0].sets:,} sets on {count_noun(of[0].units, 'unit')}"
+        + "".join(f", {each.sets:,} on {each.units}" for each in of[1:])
+        for size, of in by_size.items()
+    ]
+    return "; ".join([*([f"a {findings.effort} search"] if findings.effort else []), *rounds])
+
+
 def _best_table(findings: PlacementFindings) -> DataTable:
     """The best set of each size."""
     held_out = any(best.held_out is not None for best in findings.best)
     validated = not held_out and any(best.cross_validated_error is not None for best in findings.best)
     rows = []
+    beaten = [point.stations for point in curve_points(findings) if not point.on_front]
     for best in findings.best:
         tried = findings.of(best.stations)
         rows.append(
             [
                 len(best.stations),
-                Stack(set_name(best.stations), "" if best.on_front else "a smaller set is better"),
+                Stack(set_name(best.stations), "a smaller set errs less" if best.stations in beaten else ""),
                 set_error(findings, tried),
                 *([held_out_error(findings, best)] if held_out else []),
                 *([Interval.of(best.cross_validated_error, None, None, findings.unit)] if validated else []),
@@ -151,7 +198,7 @@ def _best_table(findings: PlacementFindings) -> DataTable:
                 Stack(
                     best.of or "", f"stays best in {format_share(share)}" if (share := best.selection_stability) else ""
                 ),
-                list_sets(best.ties) if best.ties else "none",
+                list_sets(best.ties, 1) if best.ties else "none",
             ]
         )
     caption = (
@@ -172,6 +219,23 @@ def _best_table(findings: PlacementFindings) -> DataTable:
         "ties",
     ]
     return DataTable(head, rows, caption=caption, label="best sets")
+
+
+def _steps_table(findings: PlacementFindings) -> DataTable:
+    """Each two of the best sets of the asked sizes, compared on held-out units."""
+    rows = [
+        [
+            set_name(step.larger),
+            set_name(step.smaller),
+            Interval.of(step.difference, step.low, step.high, signed=True),
+            step.verdict,
+            step.units,
+        ]
+        for step in findings.size_steps
+    ]
+    caption = "Positive: the larger set errs less. Paired over units; the verdict is corrected for all pairs of sizes."
+    head = ["larger set", "against", f"gain [{findings.unit}]", "larger set is", "units"]
+    return DataTable(head, rows, caption=caption, label="sizes compared")
 
 
 def _rankings(findings: PlacementFindings) -> list[Block]:

@@ -16,6 +16,7 @@ from harness.results.findings import (
     StationSetResult,
     StatisticalPower,
 )
+from harness.results.findings.advice import PlacementAdvice, SetError
 
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
 _SET_NOUNS = {1: "place", 2: "pair", 3: "triple"}
@@ -66,10 +67,12 @@ def _plural(name: str) -> str:
 
 
 def placement_sentence(findings: PlacementFindings) -> str:
-    """The answer: the best set of each size that was asked about.
+    """The answer: of a question what is advised, of a study in a file the best set of each size that it asks about.
 
     Without such sizes it is the smallest set that is not significantly worse than the best set of any size.
     """
+    if findings.advice is not None:
+        return " ".join(filter(None, (_disagreement(findings), _advice_sentence(findings, findings.advice))))
     units = {unit for tried in findings.tried for unit in tried.errors}
     # Findings of earlier versions have the errors of clips, whose names tell their performers.
     counted = count_units(units) if any(unit.startswith("performer ") for unit in units) else count_clips(units)
@@ -88,6 +91,102 @@ def placement_sentence(findings: PlacementFindings) -> str:
         sets = "Another set of this size is" if len(best.ties) == 1 else f"{len(best.ties)} other sets of this size are"
         sentences.append(f"{sets} tied with it.")
     return " ".join([*sentences, *chosen])
+
+
+def _advice_sentence(findings: PlacementFindings, advice: PlacementAdvice) -> str:
+    """What to wear, what cannot be told from it, and its error: "Wear two stations for walking: head + pelvis, ..."."""
+    best, size = advice.best, len(advice.best.stations)
+    added = tuple(name for name in best.stations if name not in findings.base)
+    behaviours = " and ".join(map(plain_name, findings.behaviours))
+    if findings.base:
+        told = f"add {set_name(added)} to {set_name(findings.base)}" if added else f"{set_name(best.stations)} suffices"
+        told = f"For {behaviours}, {told}"
+    else:
+        told = f"Wear {_count_stations(size)} for {behaviours}: {set_name(best.stations)}"
+    cost = f" at a cost of {best.cost:g}" if best.cost is not None else ""
+    error = Interval.of(best.error, best.low, best.high, findings.unit)
+    known = f"{findings.split} " if findings.split else ""
+    units = f" on {best.units} held-out {known}{_unit_noun(findings, best.units)}" if best.units else ""
+    search = f"a {findings.effort} search" if findings.effort else _clips_used(findings)
+    return f"{told}{_ties_in_words(advice)}{cost}; {error}{units} ({search})."
+
+
+def _ties_in_words(advice: PlacementAdvice) -> str:
+    """The sets that cannot be told from the advised one: ", or head + torso, which cannot be told from it"."""
+    if not advice.ties:
+        return ""
+    noun = _SET_NOUNS.get(len(advice.best.stations), "set")
+    if len(advice.ties) == 1:
+        return f", or {set_name(advice.ties[0])}, which cannot be told from it"
+    return f", or one of {len(advice.ties):,} {noun}s of {advice.of:,} that cannot be told from it"
+
+
+def _unit_noun(findings: PlacementFindings, count: int) -> str:
+    """What the units of a question are, such as "performers"."""
+    units = {unit for tried in findings.tried for unit in tried.errors}
+    noun = "performer" if units and all(unit.startswith("performer ") for unit in units) else "unit"
+    return noun if count == 1 else f"{noun}s"
+
+
+def _clips_used(findings: PlacementFindings) -> str:
+    """On how many units the search ended, where a number of clips was asked for."""
+    units = max((one.units for one in findings.rounds), default=0)
+    return f"chosen on {units} {_unit_noun(findings, units)}"
+
+
+def _disagreement(findings: PlacementFindings) -> str:
+    """What the second method says against the advised set; "" if nothing."""
+    second, advice = findings.second, findings.advice
+    if second is None or advice is None:
+        return ""
+    choice = next((one for one in second.choices if one.chosen == advice.best.stations), None)
+    if choice is None or not choice.worse:
+        return ""
+    more = Interval.of(choice.difference, choice.low, choice.high, findings.unit)
+    first = " and ".join(findings.methods)
+    advised = f"Methods disagree: with the set that {first} advises, {second.method} errs {more} more"
+    return f"{advised} than with {set_name(choice.best)}."
+
+
+def size_sentences(findings: PlacementFindings) -> list[str]:
+    """One line for each size (with costs: each cost) beside the advised one: is it better, and with which error."""
+    if findings.advice is None:
+        return []
+    rows = [(f"A cost of {one.cost:g} is", one) for one in findings.front]
+    if not rows:
+        errors = (
+            SetError(best.stations, best.held_out, best.held_out_low, best.held_out_high, best.held_out_clips)
+            for best in findings.best
+        )
+        rows = [(f"{_count_stations(len(one.stations)).capitalize()} {_be(one.stations)}", one) for one in errors]
+    lines = []
+    for words, one in rows:
+        if one.stations != findings.advice.best.stations:
+            error = Interval.of(one.error, one.low, one.high, findings.unit)
+            lines.append(f"{words} {_size_verdict(findings, one.stations)}: {set_name(one.stations)}, {error}.")
+    missing = sorted(set(findings.sizes) - {len(best.stations) for best in findings.best})
+    return [*lines, *(f"No set of {count_noun(size, 'station')} was measured." for size in missing)]
+
+
+def _be(stations: StationNames) -> str:
+    return "is" if len(stations) == 1 else "are"
+
+
+def _size_verdict(findings: PlacementFindings, stations: StationNames) -> str:
+    """Whether a set of another size than the advised one is worse or only not better."""
+    advised = findings.advice.best.stations if findings.advice else ()
+    for step in findings.size_steps:
+        if step.smaller == stations and step.verdict == "better":
+            return "worse"
+        if (step.smaller, step.larger) == (advised, stations):
+            return "worse" if step.verdict == "worse" else "not better"
+    return "not better"
+
+
+def _count_stations(size: int) -> str:
+    """ "one station", "three stations"."""
+    number = _NUMBERS[size] if size < len(_NUMBERS) else str(size)
+    return f"{number} station" if size == 1 else f"{number} stations"
 
 
 def _size_sentence(findings: PlacementFindings, size: int) -> str:
@@ -145,9 +244,10 @@ def power_sentences(power: StatisticalPower) -> list[str]:
     if power.needed_clips is None or power.wanted is None or power.needed_clips <= power.clips:
         return [first]
     more = f", about {format_duration(power.needed_duration_s)}" if power.needed_duration_s is not None else ""
+    measured = "The spread is that of these" if power.cell_s is None else "Spread and time are those of the first"
     second = (
         f"A difference of {Interval(power.wanted, unit=power.unit)}, a tenth of the error, would need about "
-        f"{power.needed_clips:,} units{more}. Spread and time are those of the first {power.pilot_sets} sets."
+        f"{power.needed_clips:,} units{more}. {measured} {power.pilot_sets} sets."
     )
     return [first, second]
 

@@ -177,7 +177,7 @@ def error_against_sigma(run: RunData, series: str) -> Chart:
             axes.set_title("error of the hinge angle [deg]")
             set_root_scale(axes)
             for row, hinge in enumerate(hinges):
-                place = {"transform": axes.get_yaxis_transform(), "ha": "left", "va": "center", "fontsize": 8.0}
+                place = {"transform": axes.get_yaxis_transform(), "ha": "left", "va": "center", "fontsize": 9.5}
                 axes.text(1.01, row, f"{100.0 * share[hinge]:.0f} %", color=INK, **place)
 
     return draw_chart(

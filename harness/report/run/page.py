@@ -12,7 +12,7 @@ import numpy as np
 from harness.core.arrays import Ints
 from harness.core.number_format import NOT_MEASURED, format_number
 from harness.report.kit.chart import clear_plots
-from harness.report.kit.document import chart_figure, data_uri, facts_list
+from harness.report.kit.document import chart_figure, facts_list, picture_uri
 from harness.report.kit.error_lines import choose_highlights
 from harness.report.kit.markup import Markup, join, scroll_box, tag
 from harness.report.kit.motion_player import player_card
@@ -39,6 +39,7 @@ from harness.report.run.data import RunData, read_run
 from harness.report.run.expectations import expected_orders, recovery_table
 from harness.report.run.headline import run_facts, run_verdict
 from harness.report.run.joint_errors import body_drawing, error_against_sigma, error_per_joint, highlighted_means
+from harness.report.run.losses import decompose_losses, describe_loss, loss_blocks
 from harness.report.run.player_data import run_motion
 from harness.report.run.ranking import ranking_charts
 from harness.report.run.tables import (
@@ -83,12 +84,14 @@ def write_run_page(out: Path, *, rendered: bool = True) -> Path:
     reader = cache(run.cell)
     with RenderProcess(_render_jobs(run, strips, plots, reader) if rendered else ()) as rendering:
         rankings, drawn = _draw_charts(run, lowest)
-        player = _player(run, windows, reader)
+        player, losses = _player(run, windows, reader), decompose_losses(run)
+        explained = loss_blocks(losses)
         reason = rendering.finish() if rendered else "rendering was turned off"
     why = reason if strips else "no method has the lowest error" if windows else ""
     for chart in rankings:
         chart.write(plots)
     opening, end, rest = verdict.partition(". ")
+    rest = " ".join(filter(None, [rest, *map(describe_loss, losses[:1])]))
     measured, summary = bool(run.cells), run.full_summary
     page = Page(
         verb="report",
@@ -99,6 +102,7 @@ def write_run_page(out: Path, *, rendered: bool = True) -> Path:
         missing=[f"Rendered pictures of the worst two seconds: {why}"] if why else [],
         sections=[
             Section("In 3-D", "look", player),
+            Section("Where methods lose", "losses", explained),
             Section("Varied", "varied", [*drawn["varied"], *effect_tables(run)]),
             Section("Expected orders", "expected_orders", expected_orders(summary)),
             Section("Results", "results", [*drawn["results"], *results_tables(run)] if measured else []),
@@ -217,7 +221,7 @@ def _film_strip(run: RunData, strip: Windows, picture: Path) -> Markup:
 
 
 def _image(picture: Path, alt: str) -> Markup:
-    return tag("img", src=data_uri(picture.read_bytes(), "image/png"), alt=alt)
+    return tag("img", src=picture_uri(picture), alt=alt)
 
 
 def _colour_key() -> Markup:

@@ -23,8 +23,8 @@ from harness.report.run.worst_window import WorstWindow, group_overlapping
 from harness.results import Cell
 from harness.score import PoseSequence
 
-_MOST_FRAMES = 40_000
-"""Estimated frames on a page; 20,000 take about 1 MB."""
+_MOST_FRAMES = 6_000
+"""Estimated frames on a page, which take about 0.5 MB."""
 _LOWEST_RATE_HZ = 20.0
 """Frames are left out down to this rate before clips are cut [choice]."""
 
@@ -36,7 +36,7 @@ def run_motion(run: RunData, windows: Windows, reader: CellReader) -> tuple[Play
     """The motion to play, and a note on what was left out, "" if nothing was.
 
     `windows` has the worst seconds by series and metric; `reader` reads a cell by its key. All clips are shown whole
-    where they have at most 40,000 frames in total. Else frames are left out, and if that is not enough, only the worst
+    where they have at most 6,000 frames in total. Else frames are left out, and if that is not enough, only the worst
     seconds are shown.
     """
     groups = group_rows(run)

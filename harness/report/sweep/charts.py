@@ -5,16 +5,20 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from harness.compare import MIN_UNITS, count_units, mean_interval
+from harness.core.arrays import Floats
 from harness.core.number_format import count_noun, format_number
 from harness.report.kit.axes import label_rows
 from harness.report.kit.chart import add_legend, draw_chart, label_line_ends
 from harness.report.kit.style import GRID, Axes, Chart, Figure, series_style
 from harness.report.kit.text import to_file_name, truncate
 from harness.report.sweep.data import Statistic, SweepData, VariedKey, unit_of
+from harness.report.sweep.effects import Interaction
 from harness.results import PRIMARY_METRIC
 
-MAX_SERIES, MAX_SCENARIOS, MAX_INTERVALS = 10, 12, 600
-"""Most series in a chart, scenarios with a chart for a key, and intervals on a page (each needs a bootstrap)."""
+MAX_SERIES, MAX_SCENARIOS, MAX_INTERVALS, MAX_LINES = 10, 12, 600, 6
+"""Most series in a chart, scenarios with a chart for a key, intervals on a page (each needs a bootstrap), and lines of
+an interaction."""
 _WIDTH_IN, _LINES_IN, _ROW_IN, _LETTER_IN = 4.2, 2.7, 0.085, 0.165
 _LETTERS, _MOST_ROWS, _MOST_NAMED, _MOST_LETTERS, _MOST_TICKS = 18, 4, 8, 44, 5
 """Letters of a name next to an axis, and its most rows; most lines with names at their ends; letters of a name in a
@@ -57,6 +61,31 @@ def scenarios_varying(sweep: SweepData, key: VariedKey) -> list[int]:
     return [
         n for n in range(len(sweep.scenarios)) if len(np.unique(values[(sweep.scenario_of == n) & (values >= 0)])) > 1
     ]
+
+
+def interaction_chart(interaction: Interaction) -> Chart:
+    """The error against one key, a line for each value of the other, with the interval of each mean."""
+    key, by = interaction.key, interaction.by
+    shown = sorted({int(n) for n in np.linspace(0, len(key.labels) - 1, MAX_LINES).round()})
+    lines = {n: [_statistic(interaction.errors[:, n, at]) for at in range(len(by.labels))] for n in shown}
+    names = [f"{key.name} {text}" for text in key.labels]
+    values = "; ".join(f"{names[n]} {_curve_values_text(line, by)}" for n, line in lines.items())
+    more = f" {len(shown)} of {len(key.labels)} values of {key.name} are shown." if len(shown) < len(key.labels) else ""
+    return draw_chart(
+        f"interaction_{to_file_name(key.name)}_{to_file_name(by.name)}",
+        f"{key.name} and {by.name}",
+        f"Mean over {count_units(interaction.units)} with 95 % intervals; lines that are not parallel show an "
+        f"interaction, if it can be told.{more}",
+        f"{PRIMARY_METRIC} [{unit_of(PRIMARY_METRIC)}] against {by.name}: {values}.",
+        lambda figure: _draw(figure, by, lines, names),
+        3.0 if by.numbers else _dot_chart_height_in(by, len(lines)),
+        width_in=7.0,
+    )
+
+
+def _statistic(errors: Floats) -> Statistic:
+    low, high = mean_interval(errors) if len(errors) >= MIN_UNITS else (None, None)
+    return Statistic(float(errors.mean()), len(errors), None, low, high, len(errors))
 
 
 def _count_range(counts: Sequence[int], noun: str) -> str:

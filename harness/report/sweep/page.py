@@ -1,14 +1,26 @@
-"""The page of a sweep, written from its index: best method, effect of varied keys, failures, data files."""
+"""The page of a sweep, written from its index: effects of varied keys, best method, failures, data files."""
 
 import shlex
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from harness.compare import GATED_METRICS, MIN_UNITS, count_clips, find_best
+from harness.compare import GATED_METRICS, MIN_UNITS, count_clips, count_units, find_best
 from harness.core.arrays import Bools
-from harness.core.number_format import Interval, count_noun
-from harness.report.kit.page import Block, BrowserOnly, Bullets, Code, DataTable, Page, Panels, Prose, Section, Strong
+from harness.core.number_format import Interval, count_noun, format_fixed
+from harness.report.kit.page import (
+    Block,
+    BrowserOnly,
+    Bullets,
+    Code,
+    DataTable,
+    Drawing,
+    Page,
+    Panels,
+    Prose,
+    Section,
+    Strong,
+)
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import render_text
 from harness.report.kit.ranking import BOLD_NOTE
@@ -19,17 +31,28 @@ from harness.report.sweep.charts import (
     MAX_SERIES,
     Curves,
     curves,
+    interaction_chart,
     scenarios_varying,
     sweep_chart,
 )
 from harness.report.sweep.data import METRICS, Statistic, SweepData, VariedKey, read_sweep, unit_of
-from harness.report.sweep.wording import describe_effect, group_failures, list_values, sweep_sentence
+from harness.report.sweep.effects import Interaction, KeyEffect, key_effects, key_interactions
+from harness.report.sweep.wording import (
+    best_sentence,
+    group_failures,
+    interaction_sentence,
+    list_values,
+    progress_sentence,
+    sweep_sentence,
+)
 from harness.results import INDEX_FILE, PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score import DEFINITIONS
 
 _EXAMPLE = "SELECT scenario, method, avg(mpjpe_mm) FROM cells GROUP BY scenario, method"
 _MOST_FAILURES, _MOST_PRINTED, _MOST_CELLS, _MOST_ROWS = 50, 8, 20, 60
 """Most kinds of failure on the page and in a terminal, most cells of a kind, and most rows in a terminal."""
+_MOST_INTERACTIONS = 6
+_VERDICTS = {"worse": "worse", "better": "better", "same": "the same within the margin", "cannot tell": "cannot tell"}
 _LOWER_IS_BETTER = ("deg", "mm", "ms")
 """Units of metrics whose lower values are better."""
 
@@ -50,11 +73,12 @@ def sweep_page(sweep: SweepData) -> Page:
         verb="sweep",
         name=sweep.name,
         headline=sweep_sentence(sweep),
+        lead=_result(sweep),
         facts={
             "Scenarios": list_first(sweep.scenarios, 8),
             "Clips": count_clips(sweep.clips, sweep.sampling),
             "Methods": list_first(sweep.series, 12),
-            **{f"Varied: {key.name}": f"{list_values(key)}: {describe_effect(sweep, key)}" for key in sweep.keys},
+            **{f"Varied: {key.name}": list_values(key) for key in sweep.keys},
             "Made by": sweep.command,
         },
         missing=[] if with_intervals else [slow],
@@ -73,13 +97,53 @@ def sweep_text(sweep: SweepData) -> str:
     failures = [f"{len(of):,}, such as {of[0]}: {message}" for message, of in list(groups.items())[:_MOST_PRINTED]]
     more = len(groups) - len(failures)
     rest = [Prose(f"and {more:,} more kinds of failure, in summary.json")] if more else []
-    effects = [[key.name, describe_effect(sweep, key)] for key in sweep.keys]
     sections = [
         Section("Methods", "methods", [_methods_table(sweep)]),
-        Section("Varied keys", "varied", [DataTable(["varied", f"lowest and highest mean {PRIMARY_METRIC}"], effects)]),
         Section("Failures", "failures", [Bullets(failures, prefix="FAILED "), *rest]),
     ]
-    return render_text(Page("sweep", sweep.name, sweep_sentence(sweep), {}, sections))
+    return render_text(Page("sweep", sweep.name, sweep_sentence(sweep), {}, sections, lead=_result(sweep)))
+
+
+def _result(sweep: SweepData) -> list[Block]:
+    """The progress, the best method, and for each kind of performers the interactions and the error at each value."""
+    progress, is_complete = progress_sentence(sweep), len(sweep) == sweep.planned
+    blocks: list[Block] = [Prose(progress, is_warning=not is_complete)] if sweep_sentence(sweep) != progress else []
+    blocks += [Prose(text)] if sweep.keys and (text := best_sentence(sweep)) else []
+    for performers in dict.fromkeys(sweep.performers):
+        kind = f" ({performers} performers)" if performers else ""
+        for interaction in key_interactions(sweep, performers)[:_MOST_INTERACTIONS]:
+            draw = partial(interaction_chart, interaction)
+            blocks += [
+                Prose(interaction_sentence(interaction)),
+                Drawing(draw, _interaction_table(interaction), level=0),
+            ]
+        blocks += [_effect_table(effect, kind) for effect in key_effects(sweep, performers)]
+    return blocks
+
+
+def _interaction_table(interaction: Interaction) -> DataTable:
+    """What each value of a key instead of the first one adds to the error, at each value of the other key."""
+    key, by = interaction.key, interaction.by
+    rows = [[f"{text} instead of {key.labels[0]}", *interaction.effects(n)] for n, text in enumerate(key.labels) if n]
+    head = [key.name, *(f"at {by.name} {text}" for text in by.labels)]
+    caption = f"What a value adds to the error [{unit_of(PRIMARY_METRIC)}], paired over units, with 95 % intervals."
+    return DataTable(head, rows, caption=caption, label="interaction", most_printed=_MOST_ROWS)
+
+
+def _effect_table(effect: KeyEffect, kind: str) -> DataTable:
+    """The mean error at each value of a key, and the difference to the lowest."""
+    rows = [
+        [
+            text,
+            f"{format_fixed(float(effect.errors[:, n].mean()), 2)} {unit_of(PRIMARY_METRIC)}",
+            "" if n == effect.lowest else effect.contrasts[n].difference,
+            "lowest" if n == effect.lowest else _VERDICTS[effect.contrasts[n].verdict],
+        ]
+        for n, text in enumerate(effect.key.labels)
+    ]
+    caption = f"Over {count_units(effect.units)}{kind} and all methods that were measured at every value."
+    head = [effect.key.name, "mean error", "more than the lowest", "verdict"]
+    return DataTable(head, rows, caption=caption, label=f"effect of {effect.key.name}", most_printed=_MOST_ROWS)
 
 
 def _methods_table(sweep: SweepData) -> DataTable:

@@ -1,21 +1,71 @@
-"""A sweep in words: its progress, the best method, the effect of each key, and groups of failures."""
+"""A sweep in words: the effect of each key and of two together, the best method, progress, groups of failures."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
-import numpy as np
-
-from harness.compare import GATED_METRICS, ClipValues, Sampling, count_clips, rank_methods, split_by_lag
-from harness.core.arrays import Floats
-from harness.core.number_format import format_change_percent, format_number
+from harness.compare import GATED_METRICS, ClipValues, Sampling, count_clips, count_units, rank_methods, split_by_lag
+from harness.core.number_format import format_number
 from harness.report.kit.ranking import LAG_NOTE, describe_ranking, name_lag
 from harness.report.kit.text import last_line, list_first
 from harness.report.sweep.data import SweepData, VariedKey, unit_of
+from harness.report.sweep.effects import Interaction, KeyEffect, key_effects, key_interactions
 from harness.results import PRIMARY_METRIC
+
+_MOST_NAMED = 4
+"""Most values of a key that a sentence names."""
 
 
 def sweep_sentence(sweep: SweepData) -> str:
-    """Progress and best method, in a few sentences."""
-    return f"{progress_sentence(sweep)} {_best(sweep)}".strip()
+    """The result: which value of each key is best, and which keys interact; without varied keys the best method."""
+    sentences = []
+    for performers in dict.fromkeys(sweep.performers):
+        effects = key_effects(sweep, performers)
+        of_kind = [*map(effect_sentence, effects)]
+        of_kind += [f"{_dependence(each)}." for each in key_interactions(sweep, performers) if _is_told(each)]
+        if of_kind:
+            counted = count_units({unit for effect in effects for unit in effect.units})
+            sentences.append(f"{' '.join(of_kind)} Compared on {counted}{f' ({performers})' * bool(performers)}.")
+    return " ".join(sentences) or best_sentence(sweep) or progress_sentence(sweep)
+
+
+def effect_sentence(effect: KeyEffect) -> str:
+    """Which value of a key is best, by how much, and which values cannot be told apart."""
+    name, labels, lowest = effect.key.name, effect.key.labels, effect.key.labels[effect.lowest]
+    means = effect.errors.mean(axis=0)
+    worse = sorted((n for n, contrast in effect.contrasts.items() if contrast.is_told), key=lambda n: float(means[n]))
+    tied = [labels[n] for n in effect.contrasts if n not in worse]
+    if not worse:
+        return f"{name}: {list_first([lowest, *tied], _MOST_NAMED)} cannot be told apart (lowest at {lowest})."
+    best = (
+        f"{list_first([lowest, *tied], _MOST_NAMED)} are best and cannot be told apart" if tied else f"{lowest} is best"
+    )
+    at = worse[-1] if tied else worse[0]
+    return f"{name}: {best}; {labels[at]} errs {replace(effect.contrasts[at].difference, signed=False)} more."
+
+
+def interaction_sentence(interaction: Interaction) -> str:
+    """Whether the effect of one key depends on the other, with the difference of differences."""
+    value, at = interaction.largest
+    contrast = interaction.contrasts[value, at]
+    key, by = interaction.key, interaction.by
+    effects = interaction.effects(value)
+    more = (
+        f"{key.labels[value]} instead of {key.labels[0]} changes the error by {effects[0]} at {by.labels[0]} and by "
+        f"{effects[at]} at {by.labels[at]}, a difference of differences of {contrast.difference}"
+    )
+    if contrast.is_told:
+        return f"{_dependence(interaction)}: {more} (p {contrast.p:.2g}, corrected; {count_units(interaction.units)})."
+    if all(each.verdict == "same" for each in interaction.contrasts.values()):
+        return f"The effect of {key.name} is the same at every {by.name}, within the margin: {more}."
+    return f"Whether the effect of {key.name} depends on {by.name} cannot be told ({contrast.why}): {more}."
+
+
+def _dependence(interaction: Interaction) -> str:
+    return f"The effect of {interaction.key.name} depends on {interaction.by.name}"
+
+
+def _is_told(interaction: Interaction) -> bool:
+    return interaction.contrasts[interaction.largest].is_told
 
 
 def progress_sentence(sweep: SweepData) -> str:
@@ -27,8 +77,8 @@ def progress_sentence(sweep: SweepData) -> str:
     return f"{', '.join(parts)}."
 
 
-def _best(sweep: SweepData) -> str:
-    """The sentences on the best series, separately for known and new performers and for each number of later frames."""
+def best_sentence(sweep: SweepData) -> str:
+    """The best series, separately for known and new performers and for each number of later frames."""
     groups: dict[str, dict[str, ClipValues]] = {}
     for n, (name, performer) in enumerate(zip(sweep.series, sweep.performers, strict=True)):
         values = sweep.clip_values(sweep.select(series=n), GATED_METRICS)
@@ -50,19 +100,6 @@ def _best_of(values: Mapping[str, ClipValues], frames: int, sampling: Sampling) 
     return describe_ranking(ranking, where, _format_error)
 
 
-def describe_effect(sweep: SweepData, key: VariedKey) -> str:
-    """Lowest and highest error over the values of a key, from series and clips that have all values."""
-    means = np.array([_per_series(sweep, key, value) for value in range(len(key.labels))])
-    shared = np.isfinite(means).all(axis=0)
-    if not shared.any():
-        return "no clip was measured with all values"
-    errors = means[:, shared].mean(axis=1)
-    low, high = int(np.argmin(errors)), int(np.argmax(errors))
-    rise = format_change_percent(100.0 * (errors[high] / errors[low] - 1.0)) if errors[low] else "–"
-    lowest, highest = (f"{_format_error(errors[n])} at {key.labels[n]}" for n in (low, high))
-    return f"{lowest}, {highest} ({rise})"
-
-
 def group_failures(sweep: SweepData) -> dict[str, list[str]]:
     """Last line of the traceback -> cells that failed with it, the most frequent first."""
     cells_of: dict[str, list[str]] = {}
@@ -74,14 +111,6 @@ def group_failures(sweep: SweepData) -> dict[str, list[str]]:
 def list_values(key: VariedKey, most: int = 8) -> str:
     """The first values of a key, and the number of the others."""
     return list_first(key.labels, most)
-
-
-def _per_series(sweep: SweepData, key: VariedKey, value: int) -> Floats:
-    """(series * clips,) errors at one value of the key."""
-    parts = [
-        sweep.by_clip(PRIMARY_METRIC, sweep.select(series=n, **{key.name: value})) for n in range(len(sweep.series))
-    ]
-    return np.concatenate(parts)
 
 
 def _format_error(value: float) -> str:

@@ -11,18 +11,20 @@ from typing import Any, Literal
 
 from harness.errors import BadFile
 from harness.results.files.digests import check_study, read_record, write_record
+from harness.results.findings.advice import Effort, HalvingRound, PlacementAdvice, SecondMethod, SetError, SizeStep
 from harness.results.findings.benchmark_statement import BenchmarkStatement
 
 SCHEMA = 1
 _RENAMED_KEYS = {"stays": "selection_stability", "crossed": "cross_validated_error", "worth": "contributions"}
 """Key in findings of earlier versions -> today's."""
-PlacementMode = Literal["ablate", "add", "greedy", "exhaustive", "refine"]
+PlacementMode = Literal["ablate", "add", "greedy", "exhaustive", "refine", "halve"]
 MODES: dict[PlacementMode, str] = {
     "ablate": "each left out of a base set",
     "add": "each added to a base set",
     "greedy": "one after another, the best next one each time",
     "exhaustive": "every set of so many",
     "refine": "places moved along and around the bone",
+    "halve": "the worse half left out again and again, the others measured on twice as many units",
 }
 """Mode -> the sets that it tries."""
 StationNames = tuple[str, ...]
@@ -81,6 +83,8 @@ class RankedSet:
     """Mean paired difference to the set of the previous rank; 0 for rank 1."""
     step_low: float | None = None
     step_high: float | None = None
+    units: int = 0
+    """Number of units on which a search by halves measured the set; 0 where every set was measured on the same."""
 
 
 @dataclass(frozen=True)
@@ -295,6 +299,22 @@ class PlacementFindings:
     """What the units can show; None in findings of versions that did not estimate it."""
     better: Literal["lower", "higher"] = "lower"
     """Which values of the metric are better; all differences are signed accordingly."""
+    effort: Effort = ""
+    split: Literal["", "known", "new"] = ""
+    """Whether methods learnt from other takes of the tested performers (known) or from other performers (new)."""
+    base: StationNames = ()
+    """Stations that every set contains."""
+    station_costs: dict[str, float] = field(default_factory=dict)
+    """Candidate -> its cost; {} if the number of stations is the cost."""
+    rounds: tuple[HalvingRound, ...] = ()
+    """The search by halves, round by round."""
+    advice: PlacementAdvice | None = None
+    """What is recommended; None in findings of a study in a file, and where nothing was measured."""
+    size_steps: tuple[SizeStep, ...] = ()
+    """Each two of the best sets of the asked sizes (with costs: of the sets on the front), compared."""
+    front: tuple[SetError, ...] = ()
+    """The Pareto front of cost and error, the cheapest set first; () without costs."""
+    second: SecondMethod | None = None
     kind: Literal["placement"] = "placement"
     schema: int = SCHEMA
 
@@ -342,5 +362,12 @@ def _unknown_stations(findings: PlacementFindings) -> list[str]:
     sets += [row.stations for ranking in findings.rankings for row in ranking.rows]
     sets += [step.stations for search in findings.searches for step in search.steps]
     sets += [stations for best in findings.best for stations in (best.stations, *best.ties)]
+    sets += [rounds.base for rounds in findings.rounds] + [findings.base, tuple(findings.station_costs)]
+    sets += [stations for step in findings.size_steps for stations in (step.smaller, step.larger)]
+    sets += [point.stations for point in findings.front]
+    if findings.advice:
+        sets += [findings.advice.best.stations, *findings.advice.ties]
+    if findings.second:
+        sets += [stations for one in findings.second.choices for stations in (one.chosen, one.best)]
     sets += [*findings.compared, *((contribution.candidate,) for contribution in findings.contributions)]
     return sorted({name for stations in sets for name in stations} - known)

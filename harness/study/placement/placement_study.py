@@ -15,11 +15,11 @@ import numpy as np
 from harness.compare import MIN_UNITS, compare_paired, count_needed, count_units, mean_interval
 from harness.core.progress import ProgressCallback
 from harness.errors import Outcome
-from harness.experiment import clear_caches
+from harness.experiment import check_names, clear_caches
 from harness.experiment.scenarios import Scenario
 from harness.experiment.workers import TaskExecutor, run_in_process
 from harness.mocap import LibraryFolders
-from harness.results import current_circumstances, open_study
+from harness.results import open_study
 from harness.results.files import FINDINGS
 from harness.results.findings import (
     BenchmarkStatement,
@@ -32,12 +32,12 @@ from harness.results.findings import (
 )
 from harness.score import DEFINITIONS
 from harness.study.placement import search
+from harness.study.placement.answer import QuestionRun
 from harness.study.placement.candidates import StationSet, select_groups, station_set
 from harness.study.placement.config import PublishedClaim
-from harness.study.placement.plan import PlacementPlan, is_refined
-from harness.study.placement.planner import FilePlanner, Planner, QuestionPlanner
+from harness.study.placement.plan import PlacementPlan, is_refined, plan_placement, plan_study
 from harness.study.placement.power import choose_pilot, estimate_power
-from harness.study.placement.question import PlacementQuestion
+from harness.study.placement.question import PlacementQuestion, question_study
 from harness.study.placement.ranking import (
     ConditionCosts,
     Costs,
@@ -54,8 +54,8 @@ from harness.study.placement.refinement import refine_set
 from harness.study.placement.search import ModeResult, names_of_places
 from harness.study.placement.set_results import SetResults
 
-Announce = Callable[[StatisticalPower, tuple[str, ...]], None]
-"""Receives what a study can show, and notes on its plan, before its cells run."""
+Announce = Callable[[StatisticalPower | str], None]
+"""Receives what a study can show before its cells run, and lines about the search of a question."""
 
 
 def run_placement(
@@ -67,13 +67,13 @@ def run_placement(
     jobs: int = 1,
     command: str = "",
     progress: ProgressCallback = lambda last, done, planned: None,
-    announce: Announce = lambda power, notes: None,
+    announce: Announce = lambda news: None,
 ) -> tuple[PlacementFindings, Outcome]:
     """Run the study in a TOML file, or the one that answers a question, and write findings.json into `out`.
 
-    A question's study keeps within its budget of time. Without `folder` its motion is built in, else the library's. The
-    first sets are measured as a pilot; `announce` is told what the study can show, and how long it will take with
-    `jobs` workers, before the other cells run.
+    Without `folder` a question's motion is built in, else the library's. The first sets of a file's study are measured
+    as a pilot; `announce` is told what the study can show, and how long it will take with `jobs` workers, before the
+    other cells run. The sets of a question are searched by halves (see `answer`).
 
     `out` is created, or resumed when it holds this study, else refused (BadInput). Its lock is held meanwhile. Modes
     and claims are not part of the identity of a study: they may change while its cells are kept. The outcome is
@@ -81,44 +81,44 @@ def run_placement(
     PASS: a claim that is not reproduced is a result.
     """
     clear_caches()  # files may have changed since the last run
-    planner: Planner
+    question = None
     if isinstance(asked, PlacementQuestion):
-        planner = QuestionPlanner(asked, folder, jobs)
+        question = question_study(asked, folder)
+        scenario = question.scenario
+        plan = plan_study(question.study, lambda name: scenario, folder)
+        check_names([replace(plan.scenario, methods=(asked.second,))] if asked.second else [], folder)
     else:
-        planner = FilePlanner(asked, folder)
-    plan = planner.first_plan()
-    results = SetResults(out, folder, executor, command, progress, plan.study.link)
-    return _carry_out(planner, plan, results, jobs, announce)
-
-
-def _carry_out(
-    planner: Planner, plan: PlacementPlan, cache: SetResults, jobs: int, announce: Announce
-) -> tuple[PlacementFindings, Outcome]:
-    """Measure the first sets of a plan as a pilot, then the sets of the final plan."""
+        plan = plan_placement(asked, folder)
+    cache = SetResults(out, folder, executor, command, progress, plan.study.link)
     identity = {"placement": plan.study.name, "motion": plan.motion, "seed": plan.scenario.seed}
     with open_study(cache.out, identity):
         (cache.out / "cells").mkdir(exist_ok=True)
-        sets = choose_pilot(plan.first_sets())
-        pilot = _PlacementRun(plan, cache).measure(sets) if sets else {}
-        cell_s = statistics.median(cache.seconds) if cache.seconds else None
-        notes: tuple[str, ...] = ()
-        if cell_s is not None:
-            plan, notes = planner.final_plan(cell_s)
-        units, clips = len(plan.units(plan.scenario)), len(plan.scenario.motion.test)
-        power = estimate_power(
-            pilot,
-            units=units,
-            sets=len(plan.first_sets()),
-            unit=DEFINITIONS[plan.study.metric].unit,
-            cell_s=cell_s,
-            duration_s=lambda n: None if cell_s is None else plan.cell_count(-(-n * clips // units)) * cell_s / jobs,
-        )
-        announce(power, notes)
-        findings = _PlacementRun(plan, cache).findings(cache.command, power, notes)
+        if question:
+            findings = QuestionRun(question, plan, cache, announce).findings()
+        else:
+            findings = _run_file(plan, cache, jobs, announce)
         write_placement(cache.out / FINDINGS, findings)
     if findings.failures:
         return findings, Outcome.INCOMPLETE
     return findings, Outcome.PASS if findings.best and not cache.line_loss else Outcome.NOT_COMPARABLE
+
+
+def _run_file(plan: PlacementPlan, cache: SetResults, jobs: int, announce: Announce) -> PlacementFindings:
+    """Measure the first sets of a plan as a pilot, then all."""
+    sets = choose_pilot(plan.first_sets())
+    pilot = _PlacementRun(plan, cache).measure(sets) if sets else {}
+    cell_s = statistics.median(cache.seconds) if cache.seconds else None
+    units, clips = len(plan.units(plan.scenario)), len(plan.scenario.motion.test)
+    power = estimate_power(
+        pilot,
+        units=units,
+        sets=len(plan.first_sets()),
+        unit=DEFINITIONS[plan.study.metric].unit,
+        cell_s=cell_s,
+        duration_s=lambda n: None if cell_s is None else plan.cell_count(-(-n * clips // units)) * cell_s / jobs,
+    )
+    announce(power)
+    return _PlacementRun(plan, cache).findings(cache.command, power)
 
 
 class _PlacementRun:
@@ -135,8 +135,8 @@ class _PlacementRun:
         self.costs |= {stations: self.plan.costs(by_clip) for stations, by_clip in errors.items()}
         return {stations: self.costs[stations] for stations in sets}
 
-    def findings(self, command: str, power: StatisticalPower, notes: tuple[str, ...]) -> PlacementFindings:
-        plan, study, scenario = self.plan, self.study, self.plan.scenario
+    def findings(self, command: str, power: StatisticalPower) -> PlacementFindings:
+        plan, study = self.plan, self.study
         self.measure(plan.known_sets())
         modes = list(self._modes())
         searches, ends = self._searches()
@@ -154,26 +154,15 @@ class _PlacementRun:
         best = tuple(
             _with_held_out_error(stations, held.get(stations.stations, {}), plan.cost_sign) for stations in best
         )
-        sizes = sorted({len(stations) for stations in self.costs})
-        return PlacementFindings(
-            name=study.name,
-            title=study.title,
-            metric=study.metric,
-            unit=DEFINITIONS[study.metric].unit,
-            motion=plan.motion,
-            behaviours=tuple(dict.fromkeys(scenario.motion.behaviours)),
-            methods=scenario.methods,
-            noise=scenario.noise_label,
-            link=plan.describe_link(sizes),
-            seed=scenario.seed,
-            command=command,
-            candidates=tuple(dict.fromkeys((*plan.places, *(place for stations in self.costs for place in stations)))),
+        places = tuple(dict.fromkeys((*plan.places, *(place for stations in self.costs for place in stations))))
+        return replace(
+            plan.empty_findings(command, sorted({len(stations) for stations in self.costs})),
+            candidates=places,
             tried=tuple(
                 summarise_set(names_of_places(stations), plan.rate_hz(len(stations)), plan.costs(c))
                 for stations, c in self.costs.items()
             ),
             best=best,
-            circumstances=current_circumstances(),
             rankings=tuple(ranking for rankings, _ in modes for ranking in rankings),
             searches=tuple(_with_held_out_gain(stations, held) for stations in searches),
             contributions=tuple(contribution for _, contributions in modes for contribution in contributions),
@@ -181,12 +170,10 @@ class _PlacementRun:
             conditions=rank_by_condition(conditions, list(map(names_of_places, compared)), plan.cost_sign),
             agreements=rank_agreements(conditions, list(map(names_of_places, compared))),
             claims=tuple(self._claims(alternatives, held)),
-            notes=(*notes, *self._notes(modes, held)),
-            sizes=study.sizes,
+            notes=tuple(self._notes(modes, held)),
             power=power,
             failures=dict(self.cache.failures),
             planned=self.cache.planned,
-            better="lower" if plan.cost_sign > 0.0 else "higher",
         )
 
     def _modes(self) -> Iterator[ModeResult]:

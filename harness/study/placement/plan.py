@@ -14,7 +14,9 @@ from harness.errors import BadInput
 from harness.experiment import check_names
 from harness.experiment.scenarios import Scenario, expand_clips, find_scenario, load_scenario, open_scenario_motion
 from harness.mocap import LibraryFolders, MotionSource
-from harness.results.findings import CandidatePlace
+from harness.results import current_circumstances
+from harness.results.findings import CandidatePlace, PlacementFindings
+from harness.score import DEFINITIONS
 from harness.study.placement import search
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
 from harness.study.placement.config import (
@@ -133,6 +135,29 @@ class PlacementPlan:
         rates = ", ".join(f"{size} at {self.rate_hz(size):.4g} Hz" for size in slowed)
         return f"a line of {tracker.baud} baud carries {rates}; fewer stations run at {tracker.rate_hz:g} Hz"
 
+    def empty_findings(self, command: str, sizes: Sequence[int]) -> PlacementFindings:
+        """Findings that say what is asked, with sets of these sizes, and have no results yet."""
+        study, scenario = self.study, self.scenario
+        return PlacementFindings(
+            name=study.name,
+            title=study.title,
+            metric=study.metric,
+            unit=DEFINITIONS[study.metric].unit,
+            motion=self.motion,
+            behaviours=tuple(dict.fromkeys(scenario.motion.behaviours)),
+            methods=scenario.methods,
+            noise=scenario.noise_label,
+            link=self.describe_link(sizes),
+            seed=scenario.seed,
+            command=command,
+            candidates=self.places,
+            tried=(),
+            best=(),
+            circumstances=current_circumstances(),
+            sizes=study.sizes,
+            better="lower" if self.cost_sign > 0.0 else "higher",
+        )
+
     def costs(self, errors: Costs) -> dict[str, float | None]:
         """Convert errors to costs; the conversion is its own inverse."""
         return {clip: None if value is None else self.cost_sign * value for clip, value in errors.items()}
@@ -164,7 +189,7 @@ def plan_study(study: PlacementStudy, load: Callable[[str], Scenario], folder: L
     if study.refine and study.refine.set:
         start = station_set(select_groups(study.refine.set, plan.groups, "refine.set"), plan.groups)
         check_unit_count(start, len(plan.units(scenario)))
-    for size in {len(stations) for stations in plan.known_sets()}:
+    for size in {*(len(stations) for stations in plan.known_sets()), *study.sizes}:
         plan.rate_hz(size)
     return plan
 

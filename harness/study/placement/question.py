@@ -2,39 +2,37 @@
 
     harness placement --stations 3 --behaviour table_tennis
 
-Sets are chosen on some clips of the behaviours, tested on others, and methods learn from a third part. Clips to choose
-on are of as many performers as there are, since a performer is the unit of statistics. The budget of time decides how
-sets are searched and on how many clips: see `plan_within_budget`.
+A performer is the unit of statistics. Sets are chosen on some performers, the *pool*; errors and sizes are compared on
+others, who are held out. Pool, held-out clips and examples do not depend on the effort, so that a set on a clip is the
+same cell for every effort.
 """
 
+import itertools
 import math
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
-from harness.body import select_places
-from harness.compare import count_needed
+from harness.body import NAMED_PLACES, select_places
 from harness.core.ranges import Name
-from harness.errors import BadInput, UnknownName
+from harness.errors import BadInput
 from harness.experiment.scenarios import Scenario, ScenarioMotion, Station
 from harness.mocap import LibraryFolders, MotionSource, open_motion_source
+from harness.results.findings import StationNames
+from harness.results.findings.advice import Effort
 from harness.simulate import TrackerConfig
 from harness.simulate.physics import ConstellationSettings, Physics, load_constellation
-from harness.study.placement.candidates import Candidate
-from harness.study.placement.config import MAX_STATIONS, ExhaustiveOptions, GreedyOptions, PlacementStudy
+from harness.study.placement.candidates import Candidate, CandidateGroup, StationSet, station_set
+from harness.study.placement.config import MAX_STATIONS, PlacementStudy
+from harness.study.placement.effort import CLIPS_BUDGET, DEFAULT_EFFORT, EFFORTS, Budget
+from harness.study.placement.question_clips import QuestionClips, builtin_clips, library_clips
 
-DEFAULT_METHOD = "expert_map"
-DEFAULT_MINUTES = 10.0
-DEFAULT_CLIPS = 16
-"""Clips on which sets are chosen, by default: three more than 165 sets of three need (see `power`)."""
-LEAST_CLIPS = 6
+DEFAULT_METHOD, DEFAULT_SECOND, DEFAULT_STATIONS = "expert_map", "ik", 3
 CLIP_S = 5.0
 """Length of each clip that is used [s]."""
 EXAMPLE_FRAMES = 2000
 """Number of frames that a method learns from; all where the examples have fewer."""
 NoisePreset = Literal["clean", "noise", "default"]
-_ROLES = 3
-"""Clips to choose on, held-out clips and examples have equal shares of a behaviour."""
 
 
 @dataclass(frozen=True)
@@ -50,24 +48,54 @@ class PlacementQuestion:
     noise: NoisePreset = "default"
     constellation: str = ""
     """Name of the constellation under which the physics of the tracker is simulated; "" draws statistical errors."""
-    minutes: float = DEFAULT_MINUTES
-    """Budget of time [min]."""
+    effort: Effort = ""
+    """How thoroughly sets are searched; "" is the default, or `clips`."""
     clips: int = 0
-    """Number of clips to choose on, whatever the budget; 0 chooses it within the budget."""
+    """Number of clips of each behaviour to choose on, instead of an effort."""
     seed: int = 1
+    split: Literal["sequence", "subject"] = "sequence"
+    """Whether methods learn from other takes of the tested performer too, or from other performers alone."""
+    base: tuple[str, ...] = ()
+    """Names of places that every set contains."""
+    costs: Mapping[str, float] = field(default_factory=dict)
+    """Place -> cost; 1 for the others. Without any, the number of stations is the cost."""
+    symmetric: bool = False
+    """Whether left and right are one place, at which both sides are worn."""
+    baud: int = 0
+    """Rate of the serial line; 0 is that of the device."""
+    second_method: str = ""
+    """A method that the answer is repeated with; "" chooses one, "none" is none."""
 
     @property
     def name(self) -> str:
         """A name for files, such as "table_tennis_3" or "walking_boxing_2-4"."""
         sizes = f"{self.fewest}" if self.fewest == self.most else f"{self.fewest}-{self.most}"
-        return f"{'_'.join(self.behaviours)}_{sizes}"
+        return f"{'_'.join(dict.fromkeys(self.behaviours))}_{sizes}"
 
     @property
     def title(self) -> str:
         """The question in words."""
         sizes = f"{self.fewest}" if self.fewest == self.most else f"{self.fewest} to {self.most}"
         noun = "station" if self.most == 1 else "stations"
-        return f"Where are {sizes} {noun} worn for {' and '.join(map(plain_name, self.behaviours))}?"
+        beside = f", {' and '.join(map(plain_name, self.base))} among them" if self.base else ""
+        return f"Where are {sizes} {noun} worn for {' and '.join(map(plain_name, self.behaviours))}{beside}?"
+
+    @property
+    def search_effort(self) -> Effort:
+        """The effort of the search; "" where it has a number of clips instead."""
+        return "" if self.clips else self.effort or DEFAULT_EFFORT
+
+    @property
+    def budget(self) -> Budget:
+        """What the search may use."""
+        return CLIPS_BUDGET if self.clips else EFFORTS[self.search_effort]
+
+    @property
+    def second(self) -> str:
+        """The second method; "" for none."""
+        if self.second_method == "none":
+            return ""
+        return self.second_method or (DEFAULT_SECOND if self.method != DEFAULT_SECOND else DEFAULT_METHOD)
 
 
 def plain_name(name: str) -> str:
@@ -75,46 +103,65 @@ def plain_name(name: str) -> str:
     return name.replace("_", " ")
 
 
-def question_study(question: PlacementQuestion, folder: LibraryFolders | None) -> tuple[PlacementStudy, Scenario]:
-    """The study that answers a question, with all clips that it may use, and its scenario.
+@dataclass(frozen=True)
+class QuestionStudy:
+    """The study that answers a question, checked."""
 
-    Without `folder` the motion is built in, else that of the library. UnknownName for a place, a behaviour or a
-    constellation; BadInput for a number of stations that the places do not allow, and for a behaviour with too few
-    clips.
+    question: PlacementQuestion
+    study: PlacementStudy
+    scenario: Scenario
+    """The scenario with all clips to choose on."""
+    clips: QuestionClips
+    base: tuple[CandidateGroup, ...]
+    """The groups that every set contains."""
+    station_costs: Mapping[str, float]
+    """Candidate -> cost; {} if the number of stations is the cost."""
+
+    def price(self, stations: StationNames) -> float:
+        """The total cost of a set."""
+        return math.fsum(self.station_costs.get(name, 1.0) for name in stations)
+
+
+def question_study(question: PlacementQuestion, folder: LibraryFolders | None) -> QuestionStudy:
+    """The study that answers a question. Without `folder` the motion is built in, else that of the library.
+
+    UnknownName for a place, a behaviour or a constellation; BadInput for a number of stations that the places do not
+    allow, for a cost of a place that is not asked about, for a behaviour with too few clips, and for a second method
+    that is the first.
     """
-    places = select_places(question.places)
+    base = {place.name for place in select_places(question.base)} if question.base else set()
+    asked = base | {place.name for place in select_places(question.places)}
+    places = [name for name in NAMED_PLACES if name in asked]
     physics = Physics(ConstellationSettings(name=question.constellation)) if question.constellation else None
     if physics is not None:
         load_constellation(physics.constellation)  # refuses a name that does not exist
-    most = min(MAX_STATIONS, len(places))
-    if not 1 <= question.fewest <= question.most <= most:
-        raise BadInput(
-            f"{question.fewest} to {question.most} stations of {len(places)} places.",
-            f"Ask for 1 to {most}, the smaller number first; --places names more places, `harness list places` all.",
-        )
+    costs = _station_costs(question.costs, places)
+    if question.second == question.method:
+        raise BadInput(f"--second-method {question.method} is the first one too.", "Name another one, or none.")
+    candidates = _candidates(places, symmetric=question.symmetric)
+    groups = tuple(group for candidate in candidates for group in candidate.groups())
+    fixed = tuple(group for group in groups if base & {place.name for place in group})
+    _check_sizes(question, groups, fixed)
     source = open_motion_source("builtin" if folder is None else "cmu", folder, seed=question.seed, rate_hz=None)
-    wanted = question.clips or DEFAULT_CLIPS
-    asked = list(dict.fromkeys(question.behaviours))
-    parts = [_deal_clips(name, source, at * wanted // len(asked), wanted) for at, name in enumerate(asked)]
-    test, held_out, examples = (list(_interleave([part[role] for part in parts])) for role in range(_ROLES))
-    if question.clips > len(test):
-        raise BadInput(f"{question.clips} clips of {len(test)} to choose on.", f"Ask for {len(test)} clips or fewer.")
-    test, held_out = test[:wanted], held_out[:DEFAULT_CLIPS]
-    if folder is None:
-        examples = _one_of_each(examples, {source.subject(name) for name in (*test, *held_out)}, source)
+    choose = builtin_clips if folder is None else library_clips
+    clips = choose(tuple(dict.fromkeys(question.behaviours)), source, split=question.split, most=question.clips)
     scenario = Scenario(
         name=question.name,
         motion=ScenarioMotion(
             source="builtin" if folder is None else "cmu",
-            test=tuple(test),
-            behaviours=_behaviours(test, source),
-            examples=tuple(examples),
-            thin_to=_thinned_frames(examples, source),
+            test=clips.test,
+            behaviours=tuple(map(source.behaviour, clips.test)),
+            examples=clips.examples,
+            thin_to=_thinned_frames(clips.examples, source),
+            split=question.split,
             body="common",
             longest_s=CLIP_S,
         ),
-        stations={place.name: Station(place.bone, place.along, place.around_deg) for place in places},
+        stations={
+            place.name: Station(place.bone, place.along, place.around_deg) for group in groups for place in group
+        },
         methods=(question.method,),
+        tracker=TrackerConfig(baud=question.baud) if question.baud else TrackerConfig(),
         seed=question.seed,
         noise=question.noise,
         physics=physics,
@@ -125,14 +172,62 @@ def question_study(question: PlacementQuestion, folder: LibraryFolders | None) -
         title=question.title,
         scenario=question.name,
         methods=(question.method,),
-        held_out=tuple(held_out),
+        held_out=tuple(clip for unit in clips.held_out.values() for clip in unit),
         link=True,
-        candidate=tuple(Candidate(place.name, place.bone, place.along, place.around_deg) for place in places),
-        exhaustive=ExhaustiveOptions(question.most, question.fewest, most_cells=100_000_000),
+        candidate=candidates,
         sizes=tuple(range(question.fewest, question.most + 1)),
         condition_size=question.most,
     )
-    return study, scenario
+    return QuestionStudy(question, study, scenario, clips, fixed, costs)
+
+
+def _candidates(names: Sequence[str], *, symmetric: bool) -> tuple[Candidate, ...]:
+    """A candidate for each place; with `symmetric` one for both sides, BadInput for a place on one side alone."""
+    candidates = []
+    for name in names:
+        place, bare = NAMED_PLACES[name], name.removeprefix("right_").removeprefix("left_")
+        paired = symmetric and bare != name
+        if paired and not {f"right_{bare}", f"left_{bare}"} <= set(names):
+            raise BadInput(f"--symmetric with {name} alone.", f"Name {bare}, which is both sides.")
+        if not paired or name.startswith("right_"):
+            where = place.bone, place.along, place.around_deg
+            candidates.append(Candidate(bare if paired else name, *where, pair="together" if paired else ""))
+    return tuple(candidates)
+
+
+def _check_sizes(question: PlacementQuestion, groups: Sequence[CandidateGroup], base: Sequence[CandidateGroup]) -> None:
+    """BadInput for a number of stations that places, pairs or the stations of `--with` do not allow."""
+    places, fixed = sum(map(len, groups)), sum(map(len, base))
+    most = min(MAX_STATIONS, places)
+    if not 1 <= question.fewest <= question.most <= most:
+        raise BadInput(
+            f"{question.fewest} to {question.most} stations of {places} places.",
+            f"Ask for 1 to {most}, the smaller number first; --places names more places, `harness list places` all.",
+        )
+    if fixed > question.fewest:
+        names = ", ".join(place.name for group in base for place in group)
+        advice = f"Ask for {fixed} or more: --stations counts the stations of --with."
+        raise BadInput(f"{question.fewest} stations cannot contain the {fixed} of --with ({names}).", advice)
+    reached = {fixed}
+    for group in groups:
+        if group not in base:
+            reached |= {size + len(group) for size in reached}
+    for size in range(question.fewest, question.most + 1):
+        if size not in reached:
+            raise BadInput(f"No set of {size} stations: pairs are worn together.", "Ask for another number.")
+
+
+def _station_costs(costs: Mapping[str, float], places: Sequence[str]) -> dict[str, float]:
+    """Place -> cost, 1 where none is given; {} without costs. A name with its side precedes one without."""
+    known = dict.fromkeys(places, 1.0)
+    for name, cost in sorted(costs.items(), key=lambda item: item[0].startswith(("left_", "right_"))):
+        covered = [place.name for place in select_places([name])]
+        if missing := [one for one in covered if one not in known]:
+            raise BadInput(f"--cost {name}: {missing[0]} is no place of this question.", f"It has {', '.join(known)}.")
+        if not 0.0 < cost < math.inf:
+            raise BadInput(f"--cost {name}={cost:g}.", "A cost is a number above 0.")
+        known |= dict.fromkeys(covered, cost)
+    return known if costs else {}
 
 
 def _thinned_frames(examples: Sequence[str], source: MotionSource) -> int:
@@ -149,91 +244,17 @@ def _thinned_frames(examples: Sequence[str], source: MotionSource) -> int:
     return 0
 
 
-def _deal_clips(behaviour: str, source: MotionSource, first: int, wanted: int) -> tuple[list[str], ...]:
-    """Clips of a behaviour to choose on, to hold out and to learn from; each performer's takes are dealt in turn.
-
-    Performers alternate, from the one with the index `first` on. The held-out clips begin `wanted` performers later, so
-    that they are of other performers where there are enough.
-    """
-    by_subject: dict[str, list[str]] = {}
-    for name in source.names():
-        if source.behaviour(name) == behaviour:
-            by_subject.setdefault(source.subject(name), []).append(name)
-    if not by_subject:
-        raise UnknownName("behaviour", behaviour, dict.fromkeys(filter(None, map(source.behaviour, source.names()))))
-    dealt: tuple[dict[str, list[str]], ...] = ({}, {}, {})
-    takes = [(subject, name) for subject, names in by_subject.items() for name in names]
-    for at, (subject, name) in enumerate(takes):
-        dealt[at % _ROLES].setdefault(subject, []).append(name)
-    if not all(dealt):
-        advice = "Three are needed: to choose on, to test, to learn from."
-        raise BadInput(f"{behaviour} has {len(takes)} clips.", advice)
-    starts = (first, first + wanted, first)
-    return tuple(
-        list(_interleave([role[subject] for subject in _rotate(list(role), start)]))
-        for role, start in zip(dealt, starts, strict=True)
-    )
+def count_sets(size: int, groups: Sequence[CandidateGroup], base: Sequence[CandidateGroup]) -> int:
+    """Number of sets of so many stations that contain `base`, computed without listing them."""
+    ways = [1] + [0] * size
+    for group in groups:
+        for total in range(size, len(group) - 1, -1) if group not in base else ():
+            ways[total] += ways[total - len(group)]
+    return ways[size - sum(map(len, base))]
 
 
-def _rotate(items: Sequence[str], start: int) -> list[str]:
-    """The items from index `start` on, which wraps around."""
-    at = start % len(items)
-    return [*items[at:], *items[:at]]
-
-
-def _one_of_each(clips: Sequence[str], subjects: Collection[str], source: MotionSource) -> list[str]:
-    """The first of the clips of each behaviour and each of these performers: the generator has thousands of takes."""
-    first: dict[tuple[str, str], str] = {}
-    for name in clips:
-        if source.subject(name) in subjects:
-            first.setdefault((source.behaviour(name), source.subject(name)), name)
-    return list(first.values())
-
-
-def _interleave(lists: Sequence[Sequence[str]]) -> Iterator[str]:
-    """The items of several lists in turn, so that the first n have equal shares of all while they last."""
-    for at in range(max(map(len, lists))):
-        yield from (items[at] for items in lists if at < len(items))
-
-
-def _behaviours(clips: Sequence[str], source: MotionSource) -> tuple[str, ...]:
-    """One word if all clips have the same behaviour, else one for each clip."""
-    words = tuple(map(source.behaviour, clips))
-    return words[:1] if len(set(words)) == 1 else words
-
-
-def plan_within_budget(
-    study: PlacementStudy, scenario: Scenario, question: PlacementQuestion, cell_s: float, jobs: int
-) -> tuple[PlacementStudy, Scenario, str]:
-    """The study within the question's budget, its scenario, and a sentence about what the budget allowed.
-
-    The first of these that fits is chosen: every set on all clips; every set on the least number of clips that can
-    show a difference between so many sets; one station after another on all clips; the same on ever fewer clips. The
-    last has six clips, and is chosen even if it does not fit.
-    """
-    places = len(study.candidate)
-    sets = sum(math.comb(places, size) for size in study.sizes)
-    one_by_one = sum(places - worn for worn in range(study.sizes[-1]))
-    given = len(scenario.motion.test)
-    least = min(given, count_needed(max(math.comb(places, size) for size in study.sizes) - 1))
-    few = [] if question.clips else [least]
-    fewer = [] if question.clips else list(range(given - 1, min(given, LEAST_CLIPS) - 1, -1))
-    tested = len(study.sizes) * len(study.held_out)
-    plans = [(True, clips) for clips in (given, *few)] + [(False, clips) for clips in (given, *fewer)]
-
-    def duration_s(exhaustive: bool, clips: int) -> float:
-        return ((sets if exhaustive else one_by_one) * clips + tested) * cell_s / jobs
-
-    exhaustive, clips = next((plan for plan in plans if duration_s(*plan) <= 60.0 * question.minutes), plans[-1])
-    motion = replace(scenario.motion, test=scenario.motion.test[:clips])
-    if len(motion.behaviours) > 1:
-        motion = replace(motion, behaviours=motion.behaviours[:clips])
-    scenario = replace(scenario, motion=motion)
-    text = f"every one of {sets:,} sets" if exhaustive else "one station after another, the best next one each time"
-    note = f"Within {question.minutes:g} minutes: {text}, on {clips} clips."
-    if not exhaustive:
-        whole_min = duration_s(True, given) / 60.0
-        note += f" Every one of {sets:,} sets would take about {whole_min:.0f} minutes on {given} clips."
-        options = GreedyOptions(study.sizes[-1])
-        study = replace(study, exhaustive=None, greedy=options)
-    return study, scenario, note
+def list_sets(size: int, groups: Sequence[CandidateGroup], base: Sequence[CandidateGroup]) -> list[StationSet]:
+    """All sets of so many stations that contain `base`."""
+    free, left = [group for group in groups if group not in base], size - sum(map(len, base))
+    chosen = itertools.chain.from_iterable(itertools.combinations(free, count) for count in range(left + 1))
+    return [station_set([*base, *added], groups) for added in chosen if sum(map(len, added)) == left]

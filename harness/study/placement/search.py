@@ -38,7 +38,7 @@ def ablate(table: AblateOptions, units: Sequence[CandidateGroup], measure: Measu
     sets = {names_of_places(stations): costs[stations] for stations in reduced.values()}
     ranking = rank_sets("ablate", f"{join_names(names_of_places(full))}: each left out", sets, names_of_places(full))
     contributions = [
-        _contribution(
+        contribution(
             place.name,
             "ablate",
             names_of_places(full),
@@ -68,7 +68,7 @@ def add(table: AddOptions, units: Sequence[CandidateGroup], measure: Measure) ->
     sets = {names_of_places(stations): costs[stations] for stations in extended.values()}
     title = f"{join_names(names_of_places(base))}: each added" if base else "each alone"
     contributions = [
-        _contribution(
+        contribution(
             place.name,
             "add",
             names_of_places(base),
@@ -110,7 +110,7 @@ def search_exhaustive(table: ExhaustiveOptions, units: Sequence[CandidateGroup],
         )
         for size, same_size in sizes.items()
     ]
-    return tuple(rankings), tuple(_shapley_contributions(of, units, costs))
+    return tuple(rankings), tuple(shapley_contributions(of, units, costs))
 
 
 def exhaustive_sets(table: ExhaustiveOptions, units: Sequence[CandidateGroup]) -> list[StationSet]:
@@ -208,13 +208,13 @@ def _measured_costs(costs: Costs) -> Costs:
     return {unit: value for unit, value in costs.items() if value is not None}
 
 
-def _contribution(
+def contribution(
     name: str, mode: Literal["ablate", "add", "exhaustive"], base: StationNames, gain: PairedDifference
 ) -> MarginalContribution:
     return MarginalContribution(name, mode, base, gain.mean, gain.low, gain.high, len(gain.units))
 
 
-def _shapley_contributions(
+def shapley_contributions(
     units: Sequence[CandidateGroup], order: Sequence[CandidateGroup], costs: Mapping[StationSet, Costs]
 ) -> Iterator[MarginalContribution]:
     """Shapley value of each unit, over the sets that were measured.
@@ -236,7 +236,7 @@ def _shapley_contributions(
             [_mean_by_unit([costs[extended] for _, extended in pairs]) for pairs in sizes.values()]
         )
         gain = compare_paired(without, with_unit)
-        yield from (_contribution(place.name, "exhaustive", (), gain) for place in unit)
+        yield from (contribution(place.name, "exhaustive", (), gain) for place in unit)
 
 
 def _contributions_at_one_size(
@@ -247,7 +247,7 @@ def _contributions_at_one_size(
         having = [costs[stations] for stations in costs if set(unit) <= set(stations)]
         lacking = [costs[stations] for stations in costs if not set(unit) & set(stations)]
         gain = compare_paired(_mean_by_unit(lacking), _mean_by_unit(having))
-        yield from (_contribution(place.name, "exhaustive", (), gain) for place in unit)
+        yield from (contribution(place.name, "exhaustive", (), gain) for place in unit)
 
 
 def _mean_by_unit(each: Sequence[Costs]) -> dict[str, float | None]:

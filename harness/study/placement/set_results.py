@@ -72,8 +72,10 @@ class SetResults:
     """Duration of each cell on its worker [s], also of those of an earlier run."""
     _rows: dict[tuple[str, str, str, str], Mapping[str, Any]] = field(default_factory=dict)
     """(scenario, variant, method, clip) -> row."""
-    _variants: dict[str, set[str]] = field(default_factory=dict)
-    """Scenario -> variants that were run."""
+    _variants: dict[tuple[str, str], set[str]] = field(default_factory=dict)
+    """(scenario, clip) -> variants that were run."""
+    _named: dict[tuple[int, float], tuple[Scenario, Scenario]] = field(default_factory=dict)
+    """(identity of a scenario, rate) -> that scenario, and the one with the rate and with the name of its cells."""
 
     @property
     def line_loss(self) -> str:
@@ -82,19 +84,28 @@ class SetResults:
 
     def run_missing(self, requests: Iterable[SetRequest]) -> None:
         """Run all sets that were not run yet, together, so that they share the workers."""
-        todo: dict[str, Scenario] = {}
-        values: dict[str, dict[str, Any]] = {}
+        values: dict[tuple[str, tuple[str, ...]], dict[str, Any]] = {}
+        todo: dict[tuple[str, tuple[str, ...]], Scenario] = {}
         for asked, sets in requests:
             for stations in sets:
                 scenario, setting = self._variant(asked, stations)
-                if _variant_key(setting) not in self._variants.get(scenario.name, ()):
-                    todo[scenario.name] = scenario
-                    values.setdefault(scenario.name, {})[_variant_key(setting)] = next(iter(setting.values()))
+                variant, motion = _variant_key(setting), scenario.motion
+                missing = [
+                    pair for pair in motion.tested if variant not in self._variants.get((scenario.name, pair[0]), ())
+                ]
+                if not missing:
+                    continue
+                clips, behaviours = zip(*missing, strict=True)
+                if (scenario.name, clips) not in todo:
+                    motion = replace(motion, test=clips, behaviours=behaviours)
+                    todo[scenario.name, clips] = replace(scenario, motion=motion)
+                values.setdefault((scenario.name, clips), {})[variant] = next(iter(setting.values()))
+                for clip in clips:
+                    self._variants.setdefault((scenario.name, clip), set()).add(variant)
         scenarios = []
-        for name, scenario in todo.items():
-            key = "worn" if not scenario.worn else "stations"
-            scenarios.append(replace(scenario, vary={key: list(values[name].values())}))
-            self._variants.setdefault(name, set()).update(values[name])
+        for key, scenario in todo.items():
+            varied = "worn" if not scenario.worn else "stations"
+            scenarios.append(replace(scenario, vary={varied: list(values[key].values())}))
         if not scenarios:
             return
         before = self.planned
@@ -155,7 +166,6 @@ class SetResults:
     def _variant(self, asked: Scenario, stations: StationSet) -> tuple[Scenario, dict[str, Any]]:
         """The scenario that a set is a variant of, and the values that make it: stations, or moved places."""
         rate = link_rate_hz(asked, len(stations), self.link)
-        scenario = replace(asked, tracker=replace(asked.tracker, rate_hz=rate), vary={})
         names = [station_name(place) for place in stations]
         moved = {
             station_name(place): {"along": place.along, "around_deg": place.around_deg}
@@ -163,9 +173,22 @@ class SetResults:
             if place.moved_from
         }
         if moved:
-            scenario = replace(scenario, worn=tuple(names))
-        name = f"{scenario.name}_{content_key(scenario.content())[:8]}"  # names are unique by content
-        return replace(scenario, name=name), {"stations": moved} if moved else {"worn": names}
+            return _name_by_content(asked, rate, worn=tuple(names)), {"stations": moved}
+        if (id(asked), rate) not in self._named:
+            self._named[id(asked), rate] = asked, _name_by_content(asked, rate)
+        return self._named[id(asked), rate][1], {"worn": names}
+
+
+def _name_by_content(asked: Scenario, rate_hz: float, worn: tuple[str, ...] = ()) -> Scenario:
+    """The scenario at a rate, with a name that is unique by content.
+
+    Test clips are no part of it, and so no part of the key of a cell: a set on a clip is one cell, with whichever other
+    clips it is asked for.
+    """
+    scenario = replace(asked, tracker=replace(asked.tracker, rate_hz=rate_hz), vary={}, worn=worn or asked.worn)
+    content = scenario.content()
+    del content["motion"]["test"], content["motion"]["behaviours"]
+    return replace(scenario, name=f"{scenario.name}_{content_key(content)[:8]}")
 
 
 def clips_of_units(scenario: Scenario, folder: LibraryFolders | None) -> dict[str, list[str]]:

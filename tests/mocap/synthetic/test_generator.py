@@ -12,7 +12,7 @@ from harness.core.arrays import Bools, Floats
 from harness.core.motion import Clip
 from harness.core.skeleton import Pose, forward_kinematics
 from harness.errors import BadInput, UnknownName
-from harness.mocap import synthetic
+from harness.mocap import open_motion_source, synthetic
 from harness.mocap.file_inspection import inspect_clip
 from harness.mocap.synthetic.curves import GRAVITY_M_S2
 from harness.mocap.synthetic.footwork import ANKLE_M, BALL_M, HEEL_BEHIND_M, flat_pitch_rad
@@ -98,6 +98,18 @@ def test_unknown_names_are_refused_with_the_choices() -> None:
         synthetic.generate("boxing", "nobody", 1, seed=0)
     with pytest.raises(BadInput, match="from 1"):
         synthetic.generate("boxing", "p1", 0, seed=0)
+
+
+def test_performers_that_no_list_names_are_others_of_the_same_kind() -> None:
+    source = open_motion_source("builtin", None, seed=1, rate_hz=None)
+    listed = {source.subject(name) for name in source.names()}
+    assert not listed & set(synthetic.UNLISTED_PERFORMERS)
+    source.check("golf_p128_06")
+    for name in ("golf_p129_01", "golf_p128_07", "golff_p128_01"):
+        with pytest.raises(UnknownName):
+            source.check(name)
+    clips = [source.load(f"walking_{who}_01") for who in ("p9", "p65", "p66")]
+    assert len({clip.skeleton.bone_m.tobytes() for clip in clips}) == 3
 
 
 def test_performers_differ_in_proportions_as_people_do() -> None:

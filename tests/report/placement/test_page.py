@@ -8,30 +8,37 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
+from matplotlib.patches import Circle
 
 from harness.cli import main
+from harness.compare import compare_paired
 from harness.core.number_format import Interval
-from harness.report.kit.render_process import start_renderer
-from harness.report.placement import body_map as body
-from harness.report.placement import page as placement_page
-from harness.report.placement.body_map import draw_body_map, interpolate_colours, select_body_maps
+from harness.report.kit.page import Drawing
+from harness.report.kit.style import Chart
+from harness.report.placement.body_map import PALE, body_map
 from harness.report.placement.charts import pareto_chart
+from harness.report.placement.error_curve import curve_points, error_curve
 from harness.report.placement.page import placement_text, write_placement_page
-from harness.report.placement.wording import placement_sentence, set_name, smallest_sufficient_set
-from harness.results.findings import BestSet, PlacementFindings, StationNames, StationSetResult, write_placement
+from harness.report.placement.set_bodies import tied_sets_blocks
+from harness.report.placement.told_apart import told_from_zero
+from harness.report.placement.wording import placement_sentence, plain_name, set_name, smallest_sufficient_set
+from harness.results.findings import (
+    BestSet,
+    MarginalContribution,
+    PlacementFindings,
+    StationNames,
+    StationSetResult,
+    write_placement,
+)
+from harness.results.findings.advice import PlacementAdvice, SecondChoice, SecondMethod, SetError, SizeStep
 from harness.study.placement.config import load_placement_study
+from tests.report.drawing import drawn_figures, points, texts_apart
 from tests.report.reading import emptied, text_of
 
-NO_PICTURE = "the renderer was ended by SIGABRT"
 PLACES = [place for group in load_placement_study("walking").groups() for place in group]
 CLIPS = tuple(f"walking_p{n}_01" for n in range(1, 9))
 ALL, PELVIS = ("right_hand", "left_hand", "pelvis"), ("pelvis",)
-
-
-@pytest.fixture
-def unseen(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Simulate a machine that cannot render; the page must say so."""
-    monkeypatch.setattr(placement_page, "draw_body_map", lambda *args, **options: (None, NO_PICTURE))
 
 
 def study_of(
@@ -124,15 +131,13 @@ def test_ties_are_called_ties(placement: PlacementFindings) -> None:
     assert next(line for line in lines if line.startswith("2  ")).endswith("right hand + pelvis")
 
 
-@pytest.mark.usefixtures("unseen")
-def test_the_page_opens_on_the_answer_and_says_what_is_missing(tmp_path: Path, placement: PlacementFindings) -> None:
+def test_the_page_opens_on_the_answer_and_has_every_number(tmp_path: Path, placement: PlacementFindings) -> None:
     hostile = "<script>alert(1)</script>"
     write_placement(tmp_path / "findings.json", replace(placement, notes=(hostile,)))
     page = write_placement_page(tmp_path)
     content, said = page.read_text(encoding="utf-8"), text_of(page)
     assert f"<h1>{placement_sentence(placement)}</h1>" in content
     assert content.index("<h1>") < content.index('aria-label="best sets"') < content.index("<nav")
-    assert f"The body map: {NO_PICTURE}" in said
     assert hostile not in content
     assert hostile in said
     for place in placement.candidates:
@@ -146,7 +151,6 @@ def test_the_page_opens_on_the_answer_and_says_what_is_missing(tmp_path: Path, p
     assert {file.suffix for file in (tmp_path / "plots").iterdir()} == {".svg", ".png"}
 
 
-@pytest.mark.usefixtures("unseen")
 def test_the_report_verb_writes_the_same_page_again(
     tmp_path: Path, placement: PlacementFindings, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -161,107 +165,133 @@ def test_the_report_verb_writes_the_same_page_again(
     assert "a placement study" in capsys.readouterr().err
 
 
-def test_candidates_are_shown_among_each_other_and_beside_what_is_worn(placement: PlacementFindings) -> None:
-    maps = select_body_maps(placement.contributions)
-    assert (set(maps[0][0]), *maps[0][1:]) == (
-        set(ALL),
-        "mean error of sets without it minus mean error of sets with it",
-        (),
+def test_every_page_has_the_body_with_the_recommended_set(placement: PlacementFindings, tmp_path: Path) -> None:
+    """Also one whose sets were searched one station after another, which leaves no contributions."""
+    for n, findings in enumerate((placement, replace(placement, contributions=()))):
+        folder = tmp_path / str(n)
+        folder.mkdir()
+        write_placement(folder / "findings.json", findings)
+        content = write_placement_page(folder).read_text(encoding="utf-8")
+        assert (
+            content.index("<h1>")
+            < content.index("The body with the recommended stations pelvis")
+            < content.index("<dl")
+        )
+        assert (folder / "plots" / "body_map.svg").exists()
+
+
+def test_what_cannot_be_told_from_zero_is_pale(rng: np.random.Generator) -> None:
+    """Of pictures of eleven places that do not matter at most one in ten shows any; a place that matters is found."""
+
+    def contributions(effects: list[float]) -> list[MarginalContribution]:
+        errors = [{f"u{n}": float(v) for n, v in enumerate(rng.normal(effect, 1.0, 16))} for effect in effects]
+        zero = dict.fromkeys(errors[0], 0.0)
+        gains = [compare_paired(each, zero) for each in errors]
+        return [
+            MarginalContribution(place.name, "exhaustive", (), gain.mean, gain.low, gain.high, len(gain.units))
+            for place, gain in zip(PLACES, gains, strict=False)
+        ]
+
+    none = [told_from_zero(contributions([0.0] * 11)) for _ in range(200)]
+    assert sum(map(bool, none)) <= 20
+    planted = [told_from_zero(contributions([1.5, *[0.0] * 9, -1.5])) for _ in range(50)]
+    assert sum({PLACES[0].name, PLACES[10].name} <= told for told in planted) >= 45
+    assert told_from_zero([replace(row, low=None, high=None) for row in contributions([9.0] * 3)]) == frozenset()
+
+
+def test_labels_of_the_body_stand_apart_and_say_which_are_pale(placement: PlacementFindings) -> None:
+    rows = tuple(
+        MarginalContribution(place.name, "exhaustive", (), 0.1 * n, 0.1 * n - 0.02 if n > 8 else -3.0, 3.0, 12)
+        for n, place in enumerate(PLACES)
     )
-    (among,) = select_body_maps([worth for worth in placement.contributions if worth.mode == "ablate"])
-    assert among[1] == "error without it minus error with all 3 stations"
-    hands = ("right_hand", "left_hand")
-    assert [(set(values), base) for values, _, base in maps if base] == [({"pelvis"}, hands)]
-    assert select_body_maps(()) == []
+    many = replace(placement, candidates=tuple(PLACES), contributions=rows, base=())
+    charts: list[Chart] = []
+    figures = drawn_figures(lambda: charts.append(body_map(many, (PLACES[0].name,))))
+    texts_apart(figures["body_map"])
+    pale = {row.candidate for row in rows} - told_from_zero(rows)
+    assert 0 < len(pale) < len(rows)
+    for n, place in enumerate(PLACES):
+        note = " (cannot be told from zero)" if place.name in pale else ""
+        assert f"{plain_name(place.name)} {'+' * (n > 0)}{0.1 * n:.2f}{note}" in charts[0].alt
+    circles = [patch for axes in figures["body_map"].axes for patch in axes.patches if isinstance(patch, Circle)]
+    colours = [to_hex(circle.get_edgecolor()) for circle in circles]
+    assert colours.count(PALE) == len(pale)
+    shown = [text.get_text() for text in figures["body_map"].legends[0].get_texts()]
+    assert shown == ["recommended", "error is lower with it", "cannot be told from zero"]
 
 
-def test_skin_has_the_colours_of_its_places_nearer_ones_more(rng: np.random.Generator) -> None:
-    places, colours = np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    found = interpolate_colours(np.array([[0.0, 0.0, 0.0], [0.2, 0.1, 0.0], [0.4, 0.0, 0.0]]), places, colours)
-    assert found[0, 0] > 0.99
-    np.testing.assert_allclose(found[1], [0.5, 0.5, 0.0], atol=1e-12)
-    assert found[2, 1] > 0.99
-    points = rng.normal(size=(50, 3))
-    np.testing.assert_allclose(interpolate_colours(points, places, colours).sum(axis=1), 1.0)
-    np.testing.assert_allclose(interpolate_colours(points, places[:1], colours[:1]), np.tile(colours[0], (50, 1)))
-
-
-def test_names_stand_beside_the_body_and_apart(monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator) -> None:
-    """Every place has its name and value, and no label overlaps another; the picture itself is a stand-in."""
-    height, width = 74, 76
-    at = np.stack([rng.uniform(0.05, 0.95, len(PLACES)) * width, rng.uniform(0.1, 0.95, len(PLACES)) * height], axis=1)
-    facing = rng.choice([-1.0, 1.0], len(PLACES))
-    views = {
-        "picture": np.full((2, height, width, 4), 200, np.uint8),
-        "at": np.array([np.column_stack([at, sign * facing]) for sign in (1.0, -1.0)]),
+def test_the_curve_has_held_out_errors_and_shows_which_steps_can_be_told(placement: PlacementFindings) -> None:
+    one, two, three = (best.stations for best in placement.best)
+    held = tuple(
+        replace(best, held_out=error, held_out_low=error - 0.5, held_out_high=error + 0.5, held_out_clips=16)
+        for best, error in zip(placement.best, (6.0, 4.0, 4.5), strict=True)
+    )
+    steps = (SizeStep(one, two, 2.0, 1.5, 2.5, 0.01, 16, "better"), SizeStep(two, three, -0.5, -1.0, 0.1, 0.2, 16))
+    findings = replace(placement, best=held, size_steps=steps)
+    assert [(point.at, point.error.value, point.on_front) for point in curve_points(findings)] == [
+        (1.0, 6.0, True),
+        (2.0, 4.0, True),
+        (3.0, 4.5, False),
+    ]
+    figure = drawn_figures(lambda: error_curve(findings))["error_curve"]
+    texts_apart(figure)
+    lines = {str(line.get_label()): line for line in figure.axes[0].lines if not str(line.get_label()).startswith("_")}
+    assert {name: points(line)[0].tolist() for name, line in lines.items()} == {
+        "the larger set is better": [1.0, 2.0],
+        "cannot be told apart": [2.0, 3.0],
     }
-    monkeypatch.setattr(body, "render_body", lambda *args: (views, ""))
-    values = {place.name: 0.1 * n for n, place in enumerate(PLACES[:-1])}
-    chart, missing = draw_body_map(PLACES, values, "worth", (PLACES[-1].name,), unit="deg")
-    assert chart is not None
-    assert missing == ""
-    assert f"{PLACES[-1].name.replace('_', ' ')} (worn)" in chart.svg
-    for n, place in enumerate(PLACES[:-1]):
-        said = f"{place.name.replace('_', ' ')} {f'+{0.1 * n:.2f}' if n else '0.00'}"
-        assert said in chart.svg, said
-        assert said in chart.alt
-    assert "worth [deg]" in chart.svg
-    assert "Dark balls: stations that are already worn." in chart.caption
+    asked = curve_points(replace(findings, sizes=(2, 3)))
+    assert [point.at for point in asked] == [2.0, 3.0]
+    text = placement_text(findings)
+    assert "a smaller set" in text
+    assert "−0.5 (−1.0 to +0.1)" in text
+    costs = {"pelvis": 1.0, "left_hand": 2.5, "right_hand": 1.0}
+    front = (SetError(one, 7.0, 6.0, 8.0, 16, 1.0), SetError(three, 4.5, 4.0, 5.0, 16, 4.5))
+    gain = (SizeStep(one, three, 2.5, 1.5, 3.5, 0.01, 16, "better"),)
+    dear = replace(findings, station_costs=costs, front=front, size_steps=gain)
+    assert [(p.at, p.error.value) for p in curve_points(dear)] == [(1.0, 7.0), (4.5, 4.5)]
+    charts: list[Chart | None] = []
+    (axes,) = drawn_figures(lambda: charts.append(error_curve(dear)))["error_curve"].axes
+    assert "the dearer set is better" in [line.get_label() for line in axes.lines]
+    assert charts[0] is not None
+    assert "against the cost of the stations" in charts[0].alt
 
 
-def test_a_renderer_that_dies_takes_nothing_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        body, "start_renderer", lambda module, arguments: start_renderer("harness.report.not_there", [])
+def test_tied_sets_are_bodies_the_best_first_and_the_rest_is_counted(placement: PlacementFindings) -> None:
+    places = [place.name for place in PLACES]
+    ties = tuple((places[a], places[b]) for a in range(4) for b in range(a + 1, 5))
+    best = BestSet(ties[0], ties[1:], of=12)
+    findings = replace(
+        placement,
+        candidates=tuple(PLACES),
+        best=(best,),
+        advice=PlacementAdvice(SetError(ties[0]), "only", ties[1:], 12),
     )
-    chart, missing = draw_body_map(PLACES, {"head": 0.1}, "worth", unit="deg")
-    assert chart is None
-    assert missing.startswith("the renderer failed")
+    (drawing,) = tied_sets_blocks(findings, ties[0])
+    assert isinstance(drawing, Drawing)
+    made: list[Chart] = []
+    figure = drawn_figures(lambda: made.append(drawing.chart()))["tied_sets"]  # type: ignore[operator, arg-type]
+    assert len(figure.axes) == 8
+    assert [sum(isinstance(patch, Circle) for patch in axes.patches) for axes in figure.axes] == [2] * 8
+    assert made[0].caption.endswith("And 2 more.")
+    text = placement_text(findings)
+    assert "and 2 more" in text[text.index("\ntied sets\n") :].split("\n\n")[0]
+    assert tied_sets_blocks(replace(findings, best=(), advice=None), ties[0]) == []
 
 
-def test_without_pyvista_or_values_the_reason_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert draw_body_map(PLACES, {"head": None}, "worth", unit="deg") == (
-        None,
-        "no candidate has a value",
-    )
-    monkeypatch.setattr(body, "find_spec", lambda name: None)
-    chart, missing = draw_body_map(PLACES, {"head": 0.1}, "worth", unit="deg")
-    assert chart is None
-    assert "viz" in missing
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("renders")
-def test_the_rendered_body_has_the_colours_of_the_scale(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Skin is yellow at the largest contribution, purple at zero and grey where nothing was tried."""
-    kept: dict[str, np.ndarray] = {}
-
-    def keep(places: object, values: object, description: str, views: dict[str, np.ndarray], *rest: object) -> None:
-        kept.update(views)
-
-    monkeypatch.setattr(body, "_chart", keep)
-    values = {"head": 0.0, "left_ankle": 0.5}
-    worn = tuple(place.name for place in PLACES if place.name not in values)
-    assert draw_body_map(PLACES, values, "worth", worn, unit="deg")[1] == ""
-    picture, at = kept["picture"].astype(float), kept["at"]
-    names = [place.name for place in PLACES]
-
-    def skin(name: str, view: int, beside: tuple[int, int]) -> list[float]:
-        across, down = at[view, names.index(name), :2].astype(int) + beside
-        red, green, blue, opaque = picture[view, down, across]
-        assert opaque == 255.0, f"{name} is on the body"
-        return [float(red), float(green), float(blue)]
-
-    red, green, blue = skin("left_ankle", 0, (-25, 0))
-    assert min(red, green) > 2.0 * blue, "yellow"
-    red, green, blue = skin("head", 0, (0, 25))
-    assert min(red, blue) > 2.0 * green, "purple"
-    grey = skin("sternum", 0, (40, 0))
-    assert np.ptp(grey) < 25.0
-    heights = {name: at[0, names.index(name), 1] for name in names}
-    assert heights["head"] < heights["sternum"] < heights["pelvis"] < heights["left_thigh"] < heights["left_ankle"]
-    assert at[0, names.index("left_hand"), 0] > at[0, names.index("right_hand"), 0], "the left is on the right"
-    assert at[1, names.index("left_hand"), 0] < at[1, names.index("right_hand"), 0]
-    assert at[0, names.index("pelvis"), 2] < 0.0 < at[1, names.index("pelvis"), 2], "the sacrum is seen from behind"
+@pytest.mark.parametrize("worse", [True, False])
+def test_where_two_methods_disagree_the_page_begins_with_it(
+    placement: PlacementFindings, tmp_path: Path, *, worse: bool
+) -> None:
+    choice = SecondChoice(("pelvis",), ("right_hand",), 1.25, 0.5, 2.0, worse, 3, 16)
+    findings = replace(placement, second=SecondMethod("ridge", (choice,)))
+    write_placement(tmp_path / "findings.json", findings)
+    content = write_placement_page(tmp_path).read_text(encoding="utf-8")
+    assert (content.index('aria-label="second method"') < content.index("<nav")) is worse
+    assert (tmp_path / "plots" / "second_method.svg").exists() is worse
+    text = placement_text(findings)
+    row = next(line for line in text.splitlines() if "+1.25 (+0.50 to +2.00)" in line)
+    assert re.match(r"1 +pelvis +right hand .*" + ("yes" if worse else "no"), row)
 
 
 def test_without_held_out_clips_the_cross_validated_error_is_beside_the_error(placement: PlacementFindings) -> None:

@@ -12,8 +12,10 @@ from harness.report.placement.wording import (
     placement_sentence,
     power_sentences,
     ranks_by_condition,
+    size_sentences,
 )
 from harness.results.findings import BestSet, ChangedOrder, PlacementFindings, RankAgreement, StatisticalPower
+from harness.results.findings.advice import PlacementAdvice, SecondChoice, SecondMethod, SetError, SizeStep
 
 POWER = StatisticalPower(
     *(16, 165, "deg", 13, 590.0, 480.0, 0.4, 0.7, 1.02, 0.3, 190, 7000.0, 4),
@@ -154,3 +156,95 @@ def test_the_answer_states_how_many_performers_the_clips_are_of(
 ) -> None:
     tried = tuple(replace(one, errors=dict(zip(clips, one.errors.values(), strict=False))) for one in findings.tried)
     assert placement_sentence(replace(findings, tried=tried, sizes=sizes)).endswith(said)
+
+
+ONE, TWO, THREE = ("pelvis",), ("left_hand", "pelvis"), ("right_hand", "left_hand", "pelvis")
+
+
+@pytest.fixture
+def asked(placement: PlacementFindings) -> PlacementFindings:
+    """A question of one to three stations, of which two are advised."""
+    best = tuple(
+        BestSet(names, of=3, held_out=error, held_out_low=error - 0.2, held_out_high=error + 0.2, held_out_clips=32)
+        for names, error in ((ONE, 6.1), (TWO, 4.14), (THREE, 4.68))
+    )
+    steps = (
+        SizeStep(ONE, TWO, 2.0, 1.5, 2.5, 0.001, 32, "better"),
+        SizeStep(ONE, THREE, 1.5, 1.0, 2.0, 0.001, 32, "better"),
+        SizeStep(TWO, THREE, -0.5, -0.9, 0.1, 0.2, 32, "cannot tell"),
+    )
+    tried = tuple(replace(one, errors={f"performer {n}": 1.0 for n in range(8)}) for one in placement.tried)
+    advice = PlacementAdvice(SetError(TWO, 4.14, 3.94, 4.34, 32), "between", of=3)
+    return replace(
+        placement,
+        sizes=(1, 2, 3),
+        best=best,
+        size_steps=steps,
+        tried=tried,
+        advice=advice,
+        effort="quick",
+        split="known",
+        behaviours=("walking", "boxing"),
+    )
+
+
+def test_the_advice_comes_first_and_no_larger_set_goes_without_a_word(asked: PlacementFindings) -> None:
+    said = placement_sentence(asked)
+    assert said == (
+        "Wear two stations for walking and boxing: left hand + pelvis; 4.14 deg (3.94 to 4.34) on 32 held-out known "
+        "performers (a quick search)."
+    )
+    assert len(said) <= 200
+    assert size_sentences(asked) == [
+        "One station is worse: pelvis, 6.1 deg (5.9 to 6.3).",
+        "Three stations are not better: both hands + pelvis, 4.68 deg (4.48 to 4.88).",
+    ]
+    worse = replace(asked, size_steps=(*asked.size_steps[:2], replace(asked.size_steps[2], verdict="worse")))
+    assert size_sentences(worse)[1].startswith("Three stations are worse: ")
+    assert size_sentences(replace(asked, sizes=(1, 2, 3, 4)))[2] == "No set of 4 stations was measured."
+    assert placement_page(asked).headline == said
+
+
+def test_sets_that_cannot_be_told_from_the_advised_one_stand_beside_it(asked: PlacementFindings) -> None:
+    assert asked.advice is not None
+    tied = replace(asked.advice, ties=(("right_hand", "pelvis"),))
+    assert "left hand + pelvis, or right hand + pelvis, which cannot be told from it; " in placement_sentence(
+        replace(asked, advice=tied)
+    )
+    many = replace(tied, ties=(("right_hand", "pelvis"), ("right_hand", "left_hand")), of=15)
+    assert "left hand + pelvis, or one of 2 pairs of 15 that cannot be told from it; " in placement_sentence(
+        replace(asked, advice=many)
+    )
+
+
+def test_stations_that_are_worn_anyway_are_added_to(asked: PlacementFindings) -> None:
+    said = placement_sentence(replace(asked, base=("pelvis",), split="new", effort="thorough"))
+    assert said.startswith("For walking and boxing, add left hand to pelvis; 4.14 deg")
+    assert said.endswith(" on 32 held-out new performers (a thorough search).")
+    assert "left hand + pelvis suffices; " in placement_sentence(replace(asked, base=TWO))
+
+
+def test_two_methods_that_disagree_are_the_headline(asked: PlacementFindings) -> None:
+    choice = SecondChoice(TWO, ("right_hand", "left_hand"), 0.8, 0.5, 1.1, worse=True, of=3, units=8)
+    other = replace(choice, chosen=ONE, worse=True)
+    apart = replace(asked, methods=("expert_map",), second=SecondMethod("ik", (other, choice)))
+    assert placement_sentence(apart).startswith(
+        "Methods disagree: with the set that expert_map advises, ik errs 0.8 deg (0.5 to 1.1) more than with both "
+        "hands. Wear two stations"
+    )
+    agreeing = replace(apart, second=SecondMethod("ik", (other, replace(choice, worse=False))))
+    assert placement_sentence(agreeing) == placement_sentence(asked)
+
+
+def test_with_costs_the_lines_are_of_costs(asked: PlacementFindings) -> None:
+    front = tuple(
+        SetError(names, error, error - 0.2, error + 0.2, 32, cost)
+        for names, error, cost in ((ONE, 6.1, 1.0), (TWO, 4.14, 2.5), (THREE, 4.0, 4.0))
+    )
+    advice = PlacementAdvice(front[1], "between", of=3)
+    priced = replace(asked, front=front, advice=advice, station_costs={"pelvis": 1.0, "left_hand": 1.5})
+    assert "left hand + pelvis at a cost of 2.5; 4.14 deg" in placement_sentence(priced)
+    assert size_sentences(priced) == [
+        "A cost of 1 is worse: pelvis, 6.1 deg (5.9 to 6.3).",
+        "A cost of 4 is not better: both hands + pelvis, 4.0 deg (3.8 to 4.2).",
+    ]

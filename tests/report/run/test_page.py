@@ -166,6 +166,7 @@ def test_plots_lie_beside_the_page(run_folder: Path) -> None:
         "per_joint.svg",
         "ranking_1.svg",
         "error_cdf.svg",
+        *(f"loss_{name}.svg" for name in ("ik", "best_match", "mean_pose")),
     }
 
 

@@ -1,5 +1,6 @@
 """Page and text of a sweep: their first sentence, their numbers and their size."""
 
+import itertools
 import json
 import re
 import shlex
@@ -26,8 +27,9 @@ from harness.report.sweep.charts import (
     sweep_chart,
 )
 from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey, collect_cells, read_sweep
+from harness.report.sweep.effects import key_effects, key_interactions
 from harness.report.sweep.page import scenario_table, sweep_page, sweep_text, write_sweep_page
-from harness.report.sweep.wording import describe_effect, group_failures, sweep_sentence
+from harness.report.sweep.wording import best_sentence, group_failures, interaction_sentence, sweep_sentence
 from harness.results import PRIMARY_METRIC, CellIndex
 from harness.results.files import compute_digests
 from tests.planted import MeansPlan, planted_sweep
@@ -63,19 +65,23 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("harness.report.sweep.page.sweep_chart", lambda *lines: None)
 
 
-def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
+def test_it_opens_on_its_result_and_says_how_far_it_came(folder: Path) -> None:
     sweep = read_sweep(folder)
     said = sweep_sentence(sweep)
-    assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map is best: ")
-    assert re.search(
-        r"on 14 clips of 7 performers\. That is [\d.]+ deg \(\d+ %\) less than ik, the next, and lower on \d+ of 7",
-        said,
-    )
-    raw = (folder / "report.html").read_text(encoding="utf-8")
+    assert re.match(r"tracker\.rate_hz: 120 is best; 20 errs [\d.]+ deg \([\d.]+ to [\d.]+\) more\. noise: ", said)
+    assert said.endswith("Compared on 7 performers.")
+    raw, text = (folder / "report.html").read_text(encoding="utf-8"), " ".join(sweep_text(sweep).split())
     assert f"<h1>{said}</h1>" in raw
     places = [raw.index(f'id="{name}"') for name in ("varied", "scenarios", "failures", "table")]
     assert places == sorted(places)
-    assert " ".join(sweep_text(sweep).split()).startswith(said)
+    assert text.startswith(f"{said} 168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map is best: ")
+    assert re.search(
+        r"on 14 clips of 7 performers\. That is [\d.]+ deg \(\d+ %\) less than ik, the next, and lower on \d+ of 7",
+        best_sentence(sweep),
+    )
+    for shown in (" ".join(text_of(folder / "report.html").split()), text):
+        assert best_sentence(sweep) in shown
+        assert interaction_sentence(key_interactions(sweep, "")[0]) in shown
 
 
 def test_a_mean_is_of_clips_that_are_means_of_their_cells(folder: Path) -> None:
@@ -99,18 +105,116 @@ def test_numbers_stand_in_rising_order_and_words_as_they_came(folder: Path) -> N
     assert (noise.labels, noise.numbers) == (("clean", "default"), ())
 
 
-def test_what_a_key_does_is_told(folder: Path) -> None:
-    """Errors rise by tenths in the plan's order 120, 20, 60."""
+def test_the_effect_of_a_key_is_that_of_complete_blocks_paired_over_units(folder: Path) -> None:
+    """The errors equal means that are computed by hand; the method that failed everywhere has no block."""
     sweep = read_sweep(folder)
-    assert re.fullmatch(r"[\d.]+ deg at 120, [\d.]+ deg at 60 \(\+\d+ %\)", describe_effect(sweep, sweep.keys[0]))
-    for shown in (text_of(folder / "report.html"), sweep_text(sweep)):
-        assert describe_effect(sweep, sweep.keys[0]) in shown
+    rate = next(effect for effect in key_effects(sweep, "") if effect.key.name == RATE)
+    with CellIndex(folder, read_only=True) as index:
+        cells = list(index.columns("scenario", "clip", "method", "varied", PRIMARY_METRIC))
+    cells = [(scenario, clip, json.loads(varied)[RATE], error) for scenario, clip, _, varied, error in cells if error]
+    by_hand = []
+    for performer in range(1, 8):
+        names = [f"{behaviour}_p{performer}_01" for behaviour in ("walking", "boxing")]
+        at = [
+            [np.mean([e for *_, clip, value, e in cells if clip == name and value == r]) for name in names]
+            for r in (20, 60, 120)
+        ]
+        by_hand.append(np.mean(at, axis=1))
+    np.testing.assert_allclose(rate.errors, by_hand)
+    assert rate.lowest == 2
+    assert rate.contrasts[0].difference.value == pytest.approx(
+        np.mean(by_hand, axis=0)[0] - np.mean(by_hand, axis=0)[2]
+    )
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize("planted", [0.6, 0.0])
+def test_an_interaction_is_found_where_it_is_planted_and_nowhere_else(tmp_path: Path, planted: float) -> None:
+    vary = {NOISE: ("clean", "default"), RATE: (20.0, 40.0)}
+    plan = MeansPlan(
+        behaviours=("walking",), clips=12, methods={"ik": 3.0}, vary=vary, interaction=planted, seeds=(1, 2, 3)
+    )
+    out = planted_sweep(tmp_path / "out", plan)
+    sweep = read_sweep(out)
+    (interaction,) = key_interactions(sweep, "")
+    assert (interaction.key.name, interaction.by.name) == (NOISE, RATE)
+    (contrast,) = interaction.contrasts.values()
+    low, high = contrast.difference.low, contrast.difference.high
+    assert low <= 3.0 * planted * np.exp(0.02) <= high
+    said, page = sweep_sentence(sweep), text_of(write_sweep_page(out))
+    assert contrast.is_told is (planted > 0.0)
+    assert (f"The effect of {NOISE} depends on {RATE}." in said) is (planted > 0.0)
+    assert ("cannot be told" in interaction_sentence(interaction)) is (planted == 0.0)
+    assert interaction_sentence(interaction) in page
+    assert "default instead of clean" in page
+
+
+def random_cells(rng: np.random.Generator, effect: float, together: float) -> Any:
+    """The cells of a sweep of two by three values on 10 performers, who differ from each other."""
+    for clip in range(1, 11):
+        own = rng.normal(5.0, 1.0)
+        for a, b in itertools.product(range(2), range(3)):
+            error = own + effect * a + 0.3 * b + together * (a == 1 and b == 2) + rng.normal(0.0, 0.3)
+            yield (
+                "s",
+                f"walking_p{clip}_01",
+                "ik",
+                "pos",
+                "none",
+                "",
+                json.dumps({"a": "xy"[a], "b": b}),
+                *([error] * len(READ_METRICS)),
+            )
+
+
+def test_few_of_many_sweeps_without_an_effect_claim_one(rng: np.random.Generator) -> None:
+    """At most one in twenty by the significance level; the bound is that of 200 such sweeps, with a chance of 1 %."""
+
+    def claims(effect: float, together: float, count: int) -> tuple[int, int]:
+        sweeps = [
+            collect_cells(random_cells(rng, effect, together), name="x", planned=60, failures={}) for _ in range(count)
+        ]
+        main = [next(e for e in key_effects(sweep, "") if e.key.name == "a").contrasts.values() for sweep in sweeps]
+        both = [key_interactions(sweep, "")[0].contrasts.values() for sweep in sweeps]
+        return tuple(sum(any(c.is_told for c in of) for of in found) for found in (main, both))  # type: ignore[return-value]
+
+    main, both = claims(0.0, 0.0, 200)
+    assert main <= 18
+    assert both <= 18
+    main, both = claims(1.0, 1.2, 40)
+    assert main >= 36
+    assert both >= 36
+
+
+def test_blocks_with_a_missing_value_and_other_performers_do_not_count(rng: np.random.Generator) -> None:
+    cells = [row for row in random_cells(rng, 1.0, 0.0) if row[1] != "walking_p1_01" or '"x"' in row[6]]
+    others = [(*row[:5], "known", *row[6:]) for row in random_cells(rng, -1.0, 0.0)]
+    cells = [(*row[:5], "new", *row[6:]) for row in cells]
+    sweep = collect_cells(iter(cells + others), name="x", planned=120, failures={})
+    new, known = (next(e for e in key_effects(sweep, kind) if e.key.name == "a") for kind in ("new", "known"))
+    assert (len(new.units), len(known.units)) == (9, 10)
+    assert (new.lowest, known.lowest) == (0, 1)
+    assert sweep_sentence(sweep).count("Compared on ") == 2
+    (alone,) = key_effects(
+        collect_cells(iter([row for row in cells if row[6].endswith('"b": 0}')]), name="x", planned=20, failures={}),
+        "new",
+    )
+    assert alone.key.name == "a"
+    assert (
+        key_interactions(
+            collect_cells(
+                iter([row for row in cells if row[6].endswith('"b": 0}')]), name="x", planned=20, failures={}
+            ),
+            "new",
+        )
+        == []
+    )
 
 
 def test_each_key_has_a_chart_for_each_scenario_told_in_words(folder: Path) -> None:
     alts = [str(attributes["alt"]) for tag, attributes in read(folder / "report.html").found if tag == "img"]
-    assert len(alts) == 4
-    for alt, key in zip(alts, (RATE, RATE, NOISE, NOISE), strict=True):
+    assert len(alts) == 5, "the interaction first"
+    for alt, key in zip(alts[1:], (RATE, RATE, NOISE, NOISE), strict=True):
         assert alt.startswith(f"{PRIMARY_METRIC} [deg] against {key}: ik ")
         assert "local_pca" not in alt, "all its cells failed"
 
@@ -152,9 +256,9 @@ def test_the_query_on_the_page_works(folder: Path) -> None:
         (MeansPlan(failing=("ik", "local_pca", "dynamic_map")), "0 of 42 cells finished, 42 failed."),
         (
             MeansPlan(clips=1, unmeasured=("ik", "local_pca", "dynamic_map")),
-            "6 of 6 cells finished. Nothing was measured.",
+            "Nothing was measured. 6 of 6 cells finished.",
         ),
-        (MeansPlan(methods={"ik": 1.0}, clips=1), "2 of 2 cells finished. ik: "),
+        (MeansPlan(methods={"ik": 1.0}, clips=1), " ik: "),
         (MeansPlan(known=4), "dynamic_map (known) has the lowest mean joint-angle error, "),
         (MeansPlan(clips=1, unmeasured=("ik",)), "dynamic_map has the lowest mean joint-angle error, "),
     ],
@@ -163,7 +267,7 @@ def test_nothing_is_too_little_to_be_told(plan: MeansPlan, said: str, tmp_path: 
     page = write_sweep_page(planted_sweep(tmp_path / "out", plan))
     shown = text_of(page)
     assert said in shown
-    assert said in sweep_text(read_sweep(tmp_path / "out"))
+    assert said in f" {sweep_text(read_sweep(tmp_path / 'out'))}".replace("\n", " ")
     assert "nan" not in shown.lower().split()
 
 
@@ -350,5 +454,5 @@ def test_a_folder_that_is_no_sweep_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("width", [1280, 390])
 def test_the_page_is_whole_and_quiet(browser: Any, folder: Path, width: int) -> None:
     images, first = is_whole_and_quiet(browser, folder / "report.html", width)
-    assert images == 4
-    assert first.startswith("168 of 257 cells finished")
+    assert images == 5
+    assert first.startswith("tracker.rate_hz: 120 is best")

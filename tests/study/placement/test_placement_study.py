@@ -405,10 +405,10 @@ def test_the_pilot_is_announced_before_the_other_cells_and_is_part_of_the_study(
     path = written(tmp_path, *tables, study=study)
     announced: list[StatisticalPower] = []
 
-    def announce(power: StatisticalPower, notes: tuple[str, ...]) -> None:
-        announced.append(power)
+    def announce(news: StatisticalPower | str) -> None:
+        assert isinstance(news, StatisticalPower)
+        announced.append(news)
         assert not (tmp_path / "out" / FINDINGS).exists()
-        assert notes == ()
 
     findings, _ = run_placement(path, tmp_path / "out", announce=announce, jobs=2)
     (power,) = announced
