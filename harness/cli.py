@@ -40,6 +40,7 @@ from harness.commands.trust import add_trust
 from harness.commands.validate import add_validate
 from harness.commands.verb_parser import VerbParser
 from harness.commands.view import add_view
+from harness.core.cache_folder import MACHINE_CODE, cache_folder
 from harness.core.interrupts import accept_interrupts, hold_interrupts
 from harness.core.package_data import VERSION
 from harness.core.ranges import check_command_line, check_words
@@ -113,7 +114,8 @@ def _run_verb(words: Sequence[str], args: argparse.Namespace) -> Outcome:
         check_command_line(words)
         check_words(list(vars(args).values()))
         with safe_import_path():  # MuJoCo starts a process too
-            announce(f"{words[0]}: loading")
+            compiled = (folder := cache_folder()) is not None and (folder / MACHINE_CODE).is_dir()
+            announce(f"{words[0]}: loading" + ("" if compiled else " and compiling, which takes a minute once"))
             outcome: Outcome = args.action(args)
     except SystemExit as ended:  # of a method or a library: its code is none of ours
         raise RuntimeError(f"a part of the program asked to exit with {ended.code!r}") from ended

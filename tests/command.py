@@ -1,6 +1,7 @@
 """The program in this process, with what it printed."""
 
 import json
+import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -10,7 +11,7 @@ from harness.cli import main
 
 
 class Said(NamedTuple):
-    """What a command printed."""
+    """What a command printed, without the line that it loads."""
 
     out: str
     err: str
@@ -44,7 +45,8 @@ def command(capsys: pytest.CaptureFixture[str]) -> Command:
             ended = main([*map(str, words)])
         except SystemExit as refused:  # argparse's way
             ended = int(str(refused.code))
-        said = Said(*capsys.readouterr())
+        out, err = capsys.readouterr()
+        said = Said(out, re.sub(r"\A[a-z]+: loading.*\n", "", err))  # what comes first (test_cli) is left out
         assert ended == code, said.err
         return said
 

@@ -15,6 +15,8 @@ from pathlib import Path
 from platformdirs import user_cache_path
 
 _NAME = "tracker-harness"
+MACHINE_CODE = "machine-code"
+"""Folder in it of what numba has compiled."""
 
 
 @cache

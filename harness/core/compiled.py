@@ -28,7 +28,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from filelock import FileLock, Timeout
 
-from harness.core.cache_folder import cache_folder, keep_newest
+from harness.core.cache_folder import MACHINE_CODE, cache_folder, keep_newest
 from harness.core.working_folder import plain_import
 
 with plain_import():
@@ -148,7 +148,7 @@ class _ModuleCache(_FunctionCache):  # type: ignore[misc]  # its base is Any: nu
             return False
         module = self._py_func.__module__
         key = _machine_key(module_stamp(self._py_func.__globals__), target)
-        self._cache_path = root / "machine-code" / module / key
+        self._cache_path = root / MACHINE_CODE / module / key
         with suppress(OSError):
             if self._cache_path.is_dir():
                 os.utime(self._cache_path)

@@ -244,7 +244,7 @@ def require_writable(path: Path, what: str, *, force: bool) -> None:
         raise BadFile(path, "it is not a file", f"a file name for {what}", "Choose another.")
     if path.exists() and not force:
         raise BadFile(path, "it exists", "a new file", "Choose another name, or overwrite it with --force.")
-    if fault := place_fault(path.absolute().parent):
+    if fault := place_fault(path.parent):
         raise BadFile(path, fault, f"a file name for {what}", "Choose another.")
 
 

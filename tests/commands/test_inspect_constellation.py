@@ -49,7 +49,7 @@ def test_a_clip_adds_the_stations(tmp_path: Path, command: Command) -> None:
     ]
     assert all(sum(row["shares"]) == pytest.approx(1.0) for row in said["stations"])
     assert all(row["shares"][3] > 0.8 and 1.0 < row["dilution"] < 4.0 for row in said["stations"])
-    assert "page.html: it exists" in command(*words, code=2).err
+    assert "it exists; expected a new file" in command(*words, code=2).err
     out = command(*words, "--force").out
     assert "clip: boxing_p1_01" in out
     assert "hears three for" in text_of(tmp_path / "page.html")

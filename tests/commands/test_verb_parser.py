@@ -21,7 +21,7 @@ CASES = [
     ("demo --seed x", "`harness demo`: --seed: not a whole number: 'x'."),
     ("view a --from x", "`harness view`: --from: not a number: 'x'."),
     ("run demo --methods ik,,ridge", "The list 'ik,,ridge' has an empty name."),
-    ("table a --metrics ,", "The list ',' has an empty name."),
+    ("plot a --methods ,", "The list ',' has an empty name."),
     ("record a b --alignment -1,0", "A value that begins with '-' follows '=', as in --flag=-1."),
 ]
 

@@ -159,7 +159,7 @@ def test_a_movie_is_written(viewed: Path, tmp_path: Path, command: Command, rend
 def test_the_server_shows_the_run_until_ctrl_c(viewed: Path) -> None:
     with start_harness("view", viewed, "--no-browser") as process:
         assert process.stderr is not None
-        assert process.stderr.readline() == "view: loading\n"
+        assert process.stderr.readline().startswith("view: loading")
         line = process.stderr.readline()
         address = re.search(r"http://127\.0\.0\.1:(\d+)/", line)
         assert address is not None, line

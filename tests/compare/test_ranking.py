@@ -41,6 +41,18 @@ def test_differences_are_those_of_the_means() -> None:
         assert result.low <= -difference <= result.high
 
 
+def test_simultaneous_intervals_allow_for_all_lines_of_the_test() -> None:
+    """Every one contains the interval of its difference alone; none is of units too few to be tested."""
+    ranking = rank(scattered(2, 12))
+    assert list(ranking.simultaneous) == list(ranking.results)
+    for name, (low, high) in ranking.simultaneous.items():
+        alone = ranking.results[name]
+        assert alone.low is not None
+        assert alone.high is not None
+        assert low < -alone.high < -alone.low < high
+    assert rank(scattered(2, 5)).simultaneous == {}
+
+
 def scattered(seed: int, clips: int) -> ResultSet:
     """Methods whose errors are 0.7 to 1.3 times as large, with scatter over clips."""
     rng = generator(seed, "ranking")

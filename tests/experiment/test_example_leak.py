@@ -54,7 +54,7 @@ def test_run_is_refused_in_one_line_that_names_both(
     assert main(["run", str(scenario), "--out", str(tmp_path / "run")]) == 2
     shown = capsys.readouterr()
     assert shown.out == "refused\n"
-    (line,) = shown.err.splitlines()
+    _loading, line = shown.err.splitlines()
     assert "91_01" in line
     assert "93_01" in line
     assert "remove 93_01 from motion.examples" in line
