@@ -63,7 +63,7 @@ def make_study(blocks: list[ShellBlock]) -> float:
 
 
 def draw(browser: Any, page: Path, picture: Path) -> str:
-    """Draw the first screen of a page as a small picture; returns the headline of the page."""
+    """Draw the first screen of a page as a small picture; returns its headline without brackets."""
     from PIL import Image
 
     view = browser.new_page(viewport={"width": VIEW_PX[0], "height": VIEW_PX[1]}, color_scheme="light")
@@ -72,9 +72,9 @@ def draw(browser: Any, page: Path, picture: Path) -> str:
     screen = Image.open(io.BytesIO(view.screenshot())).convert("RGB").resize(PICTURE_PX)
     picture.parent.mkdir(exist_ok=True)
     screen.quantize(128, dither=Image.Dither.NONE).save(picture, optimize=True)
-    headline = " ".join(view.inner_text("h1").split())
+    lines = view.inner_text("h1").splitlines()
     view.close()
-    return headline
+    return re.sub(r" \([^()]*\)", "", ": ".join(line.strip() for line in lines if line.strip()))
 
 
 def write_result(page: str, title: str, picture: Path, result: str, minutes: float) -> None:

@@ -15,7 +15,7 @@ from tests.test_prose import ROOT
 
 
 def build(root: Path, out: Path) -> subprocess.CompletedProcess[str]:
-    """As `make docs` does, which hides no warning with --quiet, of another folder with the documents and the package."""
+    """As `make docs` does, of another folder; --quiet would hide the warnings that --strict counts."""
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(out)]
     return subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=900, check=False)
 
