@@ -106,7 +106,7 @@ def _place(bone: str, at_far_end: bool) -> tuple[float, float]:
 
 def standing_body() -> Markup:
     """The body as a picture of class "waiting", seen from the front [cm]."""
-    lines = [" ".join(f"{100.0 * x:.1f},{-100.0 * z:.1f}" for x, z in outline) for outline in _outlines()]
+    lines = [" ".join(f"{100.0 * x:.1f},{-100.0 * z:.1f}" for x, z in outline) for outline in body_outlines()]
     shapes = [tag("polygon", points=points) for points in lines]
     return tag("svg", *shapes, class_="waiting", viewBox="-62 -84 124 187", aria_hidden="true")
 
