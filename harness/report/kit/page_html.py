@@ -96,7 +96,7 @@ class _Renderer:
             if isinstance(block, Panels) and block.charts and (panel := block.charts[0][1]()):
                 return chart_panel(panel, block.charts[0][0]), blocks
             if isinstance(block, Drawing) and (chart := self._chart(block)):
-                return chart_figure(chart), [*blocks[:n], replace(block, chart=lambda: None), *blocks[n + 1 :]]
+                return chart_figure(chart), [*blocks[:n], BrowserOnly(block.tables, block.fold), *blocks[n + 1 :]]
             if isinstance(block, BrowserOnly) and not block.fold:
                 picture, inner = self._lift(block.blocks)
                 if picture:
