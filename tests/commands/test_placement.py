@@ -134,7 +134,7 @@ def test_a_late_search_says_so_and_goes_on(small: Small, tmp_path: Path, monkeyp
     )
     assert outcome is Outcome.PASS
     assert told[0].startswith(
-        "A quick search of 3 sets: at most 500 cells to choose on, about 1 min on two quiet cores"
+        "A quick search of 3 sets: at most 300 cells to choose on, about 1 min on two quiet cores"
     )
     assert told[1].startswith("The search goes on after 0 min: ")
     assert findings.advice is not None

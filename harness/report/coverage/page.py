@@ -108,7 +108,7 @@ def _plan_chart(
         colours.outline.set_visible(False)
 
     x_m, y_m = content.views[0].x_m, content.views[0].y_m
-    height_in = 1.25 + 2.55 * min(float(np.ptp(x_m) / np.ptp(y_m)), 2.0)
+    height_in = 1.9 + 2.25 * min(float(np.ptp(x_m) / np.ptp(y_m)), 2.0)
     heights = " and ".join(f"{view.height_m:g} m" for view in content.views)
     return draw_chart(
         name,

@@ -23,7 +23,7 @@ _COLOURS = "viridis"
 _ARM_ANGLE_RAD = np.deg2rad(62.0)
 """Angle by which the arms hang below the horizontal."""
 _ARM_BONES = ("humerus", "radius", "wrist", "hand")
-_DISC_M, _AROUND = 0.036, np.linspace(0.0, 2.0 * np.pi, 19)
+_DISC_M, _AROUND = 0.036, np.linspace(0.0, 2.0 * np.pi, 21)
 _ALONG, _END_ALONG = {"clavicle": 0.5}, {"hand": 2.2, "foot": 2.2}
 """Where joint and far end of a bone are drawn, as a share of the bone; 0 and 1 for the others. Clavicles and neck share
 a joint; wrist and ankle would cover the ends of hand and foot."""
@@ -106,7 +106,7 @@ def _place(bone: str, at_far_end: bool) -> tuple[float, float]:
 
 def standing_body() -> Markup:
     """The body as a picture of class "waiting", seen from the front [cm]."""
-    lines = [" ".join(f"{100.0 * x:.1f},{-100.0 * z:.1f}" for x, z in outline) for outline in _outlines()]
+    lines = [" ".join(f"{100.0 * x:.1f},{-100.0 * z:.1f}" for x, z in outline) for outline in body_outlines()]
     shapes = [tag("polygon", points=points) for points in lines]
     return tag("svg", *shapes, class_="waiting", viewBox="-62 -84 124 187", aria_hidden="true")
 
@@ -141,7 +141,7 @@ def _each_outline() -> Iterator[Floats]:
 
 
 def project_outline(geom: BodyGeom, world_from_bone: Floats) -> Floats:
-    """(19, 2) outline of a geom seen along x, about its centre [m]."""
+    """(21, 2) outline of a geom seen along x, about its centre [m]."""
     axes = world_from_bone @ rotations.to_matrix(geom.bone_from_shape)
     circle = np.stack([np.cos(_AROUND), np.sin(_AROUND)], axis=1)
     if geom.kind == "capsule":

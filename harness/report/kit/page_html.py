@@ -82,18 +82,26 @@ class _Renderer:
 
         None for a page whose lead has a picture of its own, and without charts.
         """
-        if not self._with_charts or any(isinstance(block, Drawing | BrowserOnly) for block in page.lead):
-            return None, page.sections
-        for at, section in enumerate(page.sections):
-            for n, block in enumerate(section.blocks):
-                if isinstance(block, Panels) and block.charts and (chart := block.charts[0][1]()):
-                    return chart_panel(chart, block.charts[0][0]), page.sections
-                chart = self._chart(block) if isinstance(block, Drawing) else None
-                if isinstance(block, Drawing) and chart:
-                    rest = [*section.blocks[:n], replace(block, chart=lambda: None), *section.blocks[n + 1 :]]
-                    lifted = replace(section, blocks=rest)
-                    return chart_figure(chart), [*page.sections[:at], lifted, *page.sections[at + 1 :]]
+        if self._with_charts and not any(isinstance(block, Drawing | BrowserOnly) for block in page.lead):
+            for at, section in enumerate(page.sections):
+                picture, blocks = self._lift(section.blocks)
+                if picture:
+                    lifted = replace(section, blocks=blocks)
+                    return picture, [*page.sections[:at], lifted, *page.sections[at + 1 :]]
         return None, page.sections
+
+    def _lift(self, blocks: Sequence[Any]) -> tuple[Markup | None, Sequence[Any]]:
+        """The first chart of blocks that are not folded, and the blocks without it; a panel stays where it is too."""
+        for n, block in enumerate(blocks):
+            if isinstance(block, Panels) and block.charts and (panel := block.charts[0][1]()):
+                return chart_panel(panel, block.charts[0][0]), blocks
+            if isinstance(block, Drawing) and (chart := self._chart(block)):
+                return chart_figure(chart), [*blocks[:n], BrowserOnly(block.tables, block.fold), *blocks[n + 1 :]]
+            if isinstance(block, BrowserOnly) and not block.fold:
+                picture, inner = self._lift(block.blocks)
+                if picture:
+                    return picture, [*blocks[:n], replace(block, blocks=inner), *blocks[n + 1 :]]
+        return None, blocks
 
     def _chart(self, block: Drawing) -> Chart | None:
         """The chart of a drawing, which is also written to the folder of plots."""

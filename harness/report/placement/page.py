@@ -42,6 +42,7 @@ from harness.report.placement.wording import (
     changes_sentence,
     contribution_label,
     format_rank_range,
+    headline_sentence,
     held_out_error,
     list_sets,
     original_candidates,
@@ -114,6 +115,8 @@ def placement_page(findings: PlacementFindings, overview: Markup | None = None) 
     measured = [rows for rows in ways.values() if any(row.difference is not None for row in rows)]
     drawings = [Drawing(partial(contribution_chart, findings, rows, n)) for n, rows in enumerate(measured, start=1)]
     several = len(findings.conditions) > 1
+    headline, answer = headline_sentence(findings), placement_sentence(findings)
+    rest = answer.removeprefix(headline).strip()
     recommended, second = recommended_set(findings), second_method_blocks(findings)
     disputed = findings.second is not None and any(
         choice.worse and choice.chosen == recommended for choice in findings.second.choices
@@ -121,8 +124,9 @@ def placement_page(findings: PlacementFindings, overview: Markup | None = None) 
     return Page(
         verb="placement",
         name=findings.name,
-        headline=placement_sentence(findings),
+        headline=headline,
         lead=[
+            *([Prose(rest)] if rest else []),
             *(second if disputed else []),
             BrowserOnly([overview or Markup()]),
             Bullets(size_sentences(findings)),

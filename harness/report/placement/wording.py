@@ -93,6 +93,11 @@ def placement_sentence(findings: PlacementFindings) -> str:
     return " ".join([*sentences, *chosen])
 
 
+def headline_sentence(findings: PlacementFindings) -> str:
+    """The first sentence of a page: where methods disagree on the advice it is that, else the whole answer."""
+    return _disagreement(findings) or placement_sentence(findings)
+
+
 def _advice_sentence(findings: PlacementFindings, advice: PlacementAdvice) -> str:
     """What to wear, what cannot be told from it, and its error: "Wear two stations for walking: head + pelvis, ..."."""
     best, size = advice.best, len(advice.best.stations)

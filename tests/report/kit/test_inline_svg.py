@@ -25,7 +25,7 @@ def _draw(figure: "Figure") -> None:
 
 
 def test_ids_that_are_referred_to_stay_and_others_go() -> None:
-    svg = draw_chart("one", "", "", "", _draw, 3.0).svg
+    svg = draw_chart("one", "", "", "", _draw, 3.0).for_screen()
     text = inline_svg(svg, "alternative & text", {})
     assert text.startswith('<svg role="group" aria-label="alternative &amp; text"')
     ids = re.findall(r' id="([^"]*)"', text)

@@ -284,11 +284,15 @@ def test_where_two_methods_disagree_the_page_begins_with_it(
     placement: PlacementFindings, tmp_path: Path, *, worse: bool
 ) -> None:
     choice = SecondChoice(("pelvis",), ("right_hand",), 1.25, 0.5, 2.0, worse, 3, 16)
-    findings = replace(placement, second=SecondMethod("ridge", (choice,)))
+    advice = PlacementAdvice(SetError(("pelvis",), 3.0, 2.0, 4.0, 16), "smallest", of=3)
+    findings = replace(placement, second=SecondMethod("ridge", (choice,)), advice=advice)
     write_placement(tmp_path / "findings.json", findings)
     content = write_placement_page(tmp_path).read_text(encoding="utf-8")
     assert (content.index('aria-label="second method"') < content.index("<nav")) is worse
     assert (tmp_path / "plots" / "second_method.svg").exists() is worse
+    assert ("<h1>Methods disagree: " in content) is worse
+    assert ("<h1>Wear one station for walking: pelvis" in content) is not worse
+    assert "Wear one station for walking: pelvis" in text_of(tmp_path / "report.html")
     text = placement_text(findings)
     row = next(line for line in text.splitlines() if "+1.25 (+0.50 to +2.00)" in line)
     assert re.match(r"1 +pelvis +right hand .*" + ("yes" if worse else "no"), row)
