@@ -91,10 +91,11 @@ class _Renderer:
         return None, page.sections
 
     def _lift(self, blocks: Sequence[Any]) -> tuple[Markup | None, Sequence[Any]]:
-        """The first chart of blocks that are not folded, and the blocks without it; a panel stays where it is too."""
+        """The first chart of blocks that are not folded, and the blocks without it."""
         for n, block in enumerate(blocks):
             if isinstance(block, Panels) and block.charts and (panel := block.charts[0][1]()):
-                return chart_panel(panel, block.charts[0][0]), blocks
+                rest = replace(block, charts=block.charts[1:])
+                return chart_panel(panel, block.charts[0][0]), [*blocks[:n], rest, *blocks[n + 1 :]]
             if isinstance(block, Drawing) and (chart := self._chart(block)):
                 return chart_figure(chart), [*blocks[:n], BrowserOnly(block.tables, block.fold), *blocks[n + 1 :]]
             if isinstance(block, BrowserOnly) and not block.fold:
