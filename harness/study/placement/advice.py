@@ -49,7 +49,7 @@ def advise(
     stations, last = levels[at], len(levels) - 1
     own = races[len(stations)]
     rows = own.ranking("").rows
-    ties = tuple(row.stations for row in rows if row.tied and row.stations != stations)
+    ties = tuple(row.stations for row in rows[1:] if row.tied) if stations == own.best else ()
     why: Literal["only", "smallest", "between", "largest"]
     why = "only" if not last else "smallest" if at == 0 else "largest" if at == last else "between"
     return PlacementAdvice(errors[stations], why, ties, len(own.sets))

@@ -6,6 +6,7 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.results.findings import StationNames
+from harness.results.findings.advice import SetError
 from harness.study.placement.advice import advise, compare_levels, compare_second, find_front, set_error
 from harness.study.placement.candidates import Candidate, make_candidate_groups
 from harness.study.placement.halving import Race, SearchLimits, race_all
@@ -66,6 +67,15 @@ def test_a_difference_that_a_few_performers_show_is_no_reason_for_more_stations(
 def test_nothing_measured_gives_no_advice_and_no_error() -> None:
     assert advise([], (), {}, {}) is None
     assert set_error(ONE, {"performer 1": 2.0, "performer 2": None}).error is None
+
+
+def test_a_cheaper_set_than_the_best_of_its_size_has_none_of_its_ties() -> None:
+    found = races({1: 5.0})
+    costs: dict[StationNames, SetError] = {names: set_error(names, {"performer 1": 5.0}) for names in (ONE, ("c1",))}
+    best, cheaper = (advise([names], (), costs, found) for names in costs)
+    assert best is not None
+    assert cheaper is not None
+    assert (len(best.ties), cheaper.ties) == (3, ())
 
 
 def test_the_front_leaves_out_what_costs_more_and_errs_more() -> None:
