@@ -35,7 +35,9 @@ def effect_sentence(effect: KeyEffect) -> str:
     worse = sorted((n for n, contrast in effect.contrasts.items() if contrast.is_told), key=lambda n: float(means[n]))
     tied = [labels[n] for n in effect.contrasts if n not in worse]
     if not worse:
-        return f"{name}: {list_first([lowest, *tied], _MOST_NAMED)} cannot be told apart (lowest at {lowest})."
+        largest = max(effect.contrasts, key=lambda n: effect.contrasts[n].difference.value)
+        why = f"lowest at {lowest}; {labels[largest]}: {effect.contrasts[largest].why}"
+        return f"{name}: {list_first([lowest, *tied], _MOST_NAMED)} cannot be told apart ({why})."
     best = (
         f"{list_first([lowest, *tied], _MOST_NAMED)} are best and cannot be told apart" if tied else f"{lowest} is best"
     )
