@@ -179,7 +179,7 @@ class Interval:
         if self.low == self.high and not self.signed:
             return "exact"
         low, high = self._write(self.low), self._write(self.high)
-        if low == high and self.low < self.high:  # the width is below the digits of the value
+        if low == high and not math.isclose(self.low, self.high, rel_tol=1e-12):  # it has no visible width
             return f"± {0.5 * (self.high - self.low):.1g}"
         return f"{low} to {high}"
 

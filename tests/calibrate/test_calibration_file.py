@@ -122,8 +122,11 @@ def test_what_a_link_points_to_is_replaced(tmp_path: Path, rng: np.random.Genera
 def test_no_place_for_it(tmp_path: Path, rng: np.random.Generator) -> None:
     with pytest.raises(BadFile, match="it is not a file"):
         write_calibration(tmp_path, kept(rng), force=True)
-    with pytest.raises(BadFile, match="folder does not exist"):
-        write_calibration(tmp_path / "there" / "a.toml", kept(rng))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BadFile):
+        write_calibration(tmp_path / "file" / "a.toml", kept(rng))
+    write_calibration(tmp_path / "there" / "a.toml", one := kept(rng))  # its folder is made
+    assert same(read_calibration(tmp_path / "there" / "a.toml"), one)
     with pytest.raises(BadFile, match="no such file"):
         read_calibration(tmp_path / "b.toml")
 

@@ -80,6 +80,7 @@ def test_decimals_show_the_smallest_value(values: tuple[float | None, ...], digi
         (Interval(0.0, 0.0, 5e-3, unit="%"), "0 % (0.000 to 0.005)"),
         (Interval(39.9992, 39.999199, 39.999201), "39.9992 (± 1e-06)"),
         (Interval(-12345.0, -12345.0003, -12344.9997, unit="ms"), "−12,345 ms (± 0.0003)"),
+        (Interval(-0.1, -0.1, -0.1 + 1e-16, signed=True), "−0.1 (−0.1 to −0.1)"),  # a width of rounding alone
         (Interval(-1.0, -2.0, math.inf), "−1 (−2 to ∞)"),
         (Interval(2.0, 2.0, 2.0, unit="mm"), "2 mm"),
         (Interval(1.23456), "1.23"),

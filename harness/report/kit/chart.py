@@ -77,9 +77,10 @@ def add_legend(figure: Figure, axes: Axes) -> None:
     handles, names = axes.get_legend_handles_labels()
     scale = legend_scale()
     room, row_in = _LETTERS * figure.get_figwidth() / _WIDTH_IN / scale, _ROW_IN * scale
+    names = [textwrap.fill(name, int(room) - _HANDLE_LETTERS) for name in names]
     columns = next((n for n in range(len(names), 1, -1) if _legend_letters(names, n) <= room), 1)
     figure.legend(handles, names, loc="outside upper left", ncols=columns)
-    further_rows = max(math.ceil(len(names) / columns) - 1, 0)
+    further_rows = max(math.ceil(len(names) / columns) - 1, 0) + sum(name.count("\n") for name in names)
     figure.set_figheight(figure.get_figheight() + row_in * further_rows)
 
 

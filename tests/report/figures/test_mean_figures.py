@@ -38,8 +38,12 @@ def test_rows_have_the_means_intervals_and_differences_of_the_ranking(ranked: Pa
         )
         *shown, other_edge = [float(np.ravel(line.get_xdata())[0]) for line in differences.lines[1:]]
         np.testing.assert_allclose(shown, [0.0, *(ranking.differences[name] for name in inside[1:])])
-        results = [ranking.results[name] for name in inside[1:]]
-        expected = [(-r.high, -r.low) for r in results if r.low is not None and r.high is not None]
+        expected = list[tuple[float, float]]()
+        for name in inside[1:]:  # the interval of the difference, and below it that which is corrected for all lines
+            low, high = ranking.results[name].low, ranking.results[name].high
+            assert low is not None
+            assert high is not None
+            expected += [(-high, -low), ranking.simultaneous[name]]
         np.testing.assert_allclose(spans(differences.collections, 0), expected)
         assert edge == other_edge == 1.0  # of the width of the axis
         written = [[text.get_text() for text in axes.texts if text.get_text()[-1:].isdigit()] for axes in figure.axes]

@@ -151,7 +151,7 @@ def test_contents_that_do_not_fit_are_refused() -> None:
 def test_the_description_has_numbers_that_were_measured_only(unit_with_faults: UnitReport, bare: UnitReport) -> None:
     spread, noise, excursions, shares, timing = description(unit_with_faults)
     values = {row.key: find_quantity(row.key).of(row.measured).number for row in unit_with_faults.parameters}
-    for name, words in (("half_within_m", "positions are within"), ("most_within_m", "95 % within")):
+    for name, words in (("half_within_m", "positions lie within"), ("most_within_m", "95 % in")):
         figures = [row.figures[name].value for row in unit_with_faults.stations]
         assert f"{words} {1e3 * min(figures):.2f} to {1e3 * max(figures):.2f} mm" in spread
     drift = "components.drift"

@@ -1,6 +1,5 @@
 """The page of a run: its content, its safety, and what remains when pictures cannot be rendered."""
 
-import base64
 import json
 import re
 import subprocess
@@ -16,6 +15,7 @@ from PIL import Image
 from harness.compare import compare_runs
 from harness.errors import BadFile
 from harness.report.kit import render_process
+from harness.report.kit.document import picture_uri
 from harness.report.kit.page import DataTable, Strong
 from harness.report.run import page as run_page
 from harness.report.run.data import WORST_METRICS, read_run
@@ -338,7 +338,7 @@ def test_rendered_strips_show_two_bodies(tmp_path: Path, renders: None) -> None:
     strips = list((out / "plots").glob("worst_*.png"))
     assert 1 <= len(strips) <= len(WORST_METRICS)
     text = page.read_text(encoding="utf-8")
-    assert all(base64.b64encode(strip.read_bytes()).decode() in text for strip in strips)
+    assert all(picture_uri(strip) in text for strip in strips)
     assert "ik at its worst instant: walking_p1_01, " in text
     with Image.open(out / "plots" / "worst_instant.png") as still:
         assert still.size == (640, 600)
