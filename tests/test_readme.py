@@ -191,8 +191,8 @@ def test_the_table_of_the_readme_is_the_demo_s(tmp_path: Path, behaviour: str) -
 
 
 def commands(text: str) -> list[str]:
-    """What follows `harness` in every line of code, without its comment and redirections."""
-    return re.findall(r"^(?: {4})?harness (.*?)(?:  +#.*)?$", text, re.MULTILINE)
+    """What follows `harness` in every line of code, without its comment and what is done where it fails."""
+    return re.findall(r"^(?: {4})?harness (.*?)(?:  +#.*| \|\| .*)?$", text, re.MULTILINE)
 
 
 def blocks(text: str, language: str) -> list[str]:
