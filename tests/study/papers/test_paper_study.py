@@ -165,7 +165,7 @@ def test_a_folder_of_another_study_is_refused(finished: Path, tmp_path: Path) ->
 
 
 def test_names_that_do_not_exist_are_refused_before_anything_is_written(tmp_path: Path) -> None:
-    wrong = replace(BOUTS, motion=replace(BOUTS.motion, test=("boxing_p99_01",)))
+    wrong = replace(BOUTS, motion=replace(BOUTS.motion, test=("boxing_p999_01",)))
     with pytest.raises(UnknownName):
         reproduce(replace(TINY, runs=(WALKS, wrong)), tmp_path / "tiny")
     assert not (tmp_path / "tiny").exists()

@@ -247,7 +247,7 @@ def test_what_makes_no_sense_is_refused_before_anything_is_written(
         ('metric = "mpjpe"', "no metric called 'mpjpe'"),
         ('metric = "lag_ms"', "metric of accuracy, smoothness or time"),
         ('held_out = ["walking_p1_01@0.20-0.25"]', "also a test clip"),
-        ('held_out = ["walking_p99_01"]', "walking_p99_01"),
+        ('held_out = ["walking_p999_01"]', "walking_p999_01"),
         ("methods = []", "no methods"),
         ('methods = ["nobody"]', "nobody"),
         ('scenario = "runs"', "runs"),
