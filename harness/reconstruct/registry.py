@@ -168,7 +168,7 @@ def _base_method(name: str) -> Method:
         raise UnknownName("method", name, [*registered, *([f"{name}:CLASS"] if name in _modules_served() else [])])
     if not _module_exists(module):
         where = " or ".join([*served_folders(), "the installed packages"])
-        raise UnknownName(f"module for {name!r} in {where}", module, _modules_served())
+        raise UnknownName(f"module in {where}", module, _modules_served())
     with _refused(name, "It must import, and need no arguments."):
         content = importlib.import_module(module)
         if not hasattr(content, attribute):

@@ -46,7 +46,7 @@ def test_a_class_is_found_by_its_module() -> None:
     ("name", "said"),
     [
         *((name, "mean_pose") for name in ("", "ik:gausian", "ik:", "mean", "ik2+ik", "+ik")),
-        *((name, "no module for ") for name in ("../x:Class", "no_such_module:Class", ":Class")),
+        *((name, "no module in ") for name in ("../x:Class", "no_such_module:Class", ":Class")),
     ],
 )
 def test_unknown_names_are_refused_with_the_choices(name: str, said: str) -> None:
