@@ -13,7 +13,7 @@ from harness.core.number_format import format_fixed
 from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.style import COLOURS, FAINT, INK, MUTED, Axes, Chart, Figure
 from harness.report.placement.body_view import HIGH_M, LOW_M, draw_outline, draw_ring, draw_station, locate_places
-from harness.report.placement.told_apart import TOLD_NOTE, largest_group, told_from_zero
+from harness.report.placement.contribution_significance import SIGNIFICANCE_NOTE, largest_group, significant_candidates
 from harness.report.placement.wording import plain_name
 from harness.results.findings import CandidatePlace, PlacementFindings, StationNames
 
@@ -35,7 +35,7 @@ def body_map(findings: PlacementFindings, recommended: StationNames) -> Chart:
     """The body from the front and from behind, with every candidate and the recommended set."""
     rows = largest_group(findings.contributions)
     values = {row.candidate: row.difference for row in rows if row.difference is not None}
-    told = told_from_zero(rows)
+    told = significant_candidates(rows)
     worn = {*findings.base, *(rows[0].base if rows and rows[0].mode == "add" else ())}
     places = [p for p in findings.candidates if not p.moved_from or p.name in {*recommended, *worn}]
     largest = max(map(abs, values.values()), default=0.0) or 1.0
@@ -61,7 +61,7 @@ def body_map(findings: PlacementFindings, recommended: StationNames) -> Chart:
         for name in sorted(values, key=lambda name: -values[name])
     )
     more = f" Named: {_MOST_NAMED} of {len(places)} places." if len(places) > _MOST_NAMED else ""
-    numbers = f"Numbers: {what} [{findings.unit}]. {TOLD_NOTE} " if what else ""
+    numbers = f"Numbers: {what} [{findings.unit}]. {SIGNIFICANCE_NOTE} " if what else ""
     marks = {
         (INK, "ring"): "recommended" if recommended else "",
         (HELPS, "disc"): "error is lower with it" if any(values[name] > 0.0 for name in told) else "",

@@ -10,8 +10,8 @@ from harness.report.kit.axes import label_rows
 from harness.report.kit.chart import draw_chart
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER, Chart, Figure, hide_frame
 from harness.report.kit.text import list_first, to_file_name
+from harness.report.placement.contribution_significance import SIGNIFICANCE_NOTE, significant_candidates
 from harness.report.placement.pareto import draw_pareto, mean_or_nan, measured_best
-from harness.report.placement.told_apart import TOLD_NOTE, told_from_zero
 from harness.report.placement.wording import (
     TIE_NOTE,
     contribution_label,
@@ -96,7 +96,7 @@ def ranking_chart(findings: PlacementFindings, ranking: Ranking, number: int) ->
 def contribution_chart(findings: PlacementFindings, shown: Sequence[MarginalContribution], number: int) -> Chart:
     """The contribution of each candidate in one mode, the largest first."""
     rows = sorted((w for w in shown if w.difference is not None), key=lambda w: -(w.difference or 0.0))[:40]
-    title, told = contribution_label(findings, shown[0]), told_from_zero(shown)
+    title, told = contribution_label(findings, shown[0]), significant_candidates(shown)
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
@@ -116,8 +116,8 @@ def contribution_chart(findings: PlacementFindings, shown: Sequence[MarginalCont
     return draw_chart(
         f"worth_{number}_{to_file_name(shown[0].mode)}",
         f"{title[0].upper()}{title[1:]}",
-        f"Blue: sets with the station err less; orange: they err more. {TOLD_NOTE} Whiskers: 95 % interval over units, "
-        "not corrected.",
+        f"Blue: sets with the station err less; orange: they err more. {SIGNIFICANCE_NOTE} "
+        "Whiskers: 95 % interval over units, not corrected.",
         f"Contribution of candidates, {title}: {values}.",
         draw,
         _FRAME_IN + _ROW_IN * len(rows),

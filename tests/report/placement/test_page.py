@@ -18,10 +18,10 @@ from harness.report.kit.page import Drawing
 from harness.report.kit.style import Chart
 from harness.report.placement.body_map import PALE, body_map
 from harness.report.placement.charts import pareto_chart
+from harness.report.placement.contribution_significance import significant_candidates
 from harness.report.placement.error_curve import curve_points, error_curve
 from harness.report.placement.page import placement_text, write_placement_page
 from harness.report.placement.set_bodies import tied_sets_blocks
-from harness.report.placement.told_apart import told_from_zero
 from harness.report.placement.wording import placement_sentence, plain_name, set_name, smallest_sufficient_set
 from harness.results.findings import (
     BestSet,
@@ -192,11 +192,13 @@ def test_what_cannot_be_told_from_zero_is_pale(rng: np.random.Generator) -> None
             for place, gain in zip(PLACES, gains, strict=False)
         ]
 
-    none = [told_from_zero(contributions([0.0] * 11)) for _ in range(200)]
+    none = [significant_candidates(contributions([0.0] * 11)) for _ in range(200)]
     assert sum(map(bool, none)) <= 20
-    planted = [told_from_zero(contributions([1.5, *[0.0] * 9, -1.5])) for _ in range(50)]
+    planted = [significant_candidates(contributions([1.5, *[0.0] * 9, -1.5])) for _ in range(50)]
     assert sum({PLACES[0].name, PLACES[10].name} <= told for told in planted) >= 45
-    assert told_from_zero([replace(row, low=None, high=None) for row in contributions([9.0] * 3)]) == frozenset()
+    assert (
+        significant_candidates([replace(row, low=None, high=None) for row in contributions([9.0] * 3)]) == frozenset()
+    )
 
 
 def test_labels_of_the_body_stand_apart_and_say_which_are_pale(placement: PlacementFindings) -> None:
@@ -208,7 +210,7 @@ def test_labels_of_the_body_stand_apart_and_say_which_are_pale(placement: Placem
     charts: list[Chart] = []
     figures = drawn_figures(lambda: charts.append(body_map(many, (PLACES[0].name,))))
     texts_apart(figures["body_map"])
-    pale = {row.candidate for row in rows} - told_from_zero(rows)
+    pale = {row.candidate for row in rows} - significant_candidates(rows)
     assert 0 < len(pale) < len(rows)
     for n, place in enumerate(PLACES):
         note = " (cannot be told from zero)" if place.name in pale else ""

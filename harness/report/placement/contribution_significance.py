@@ -9,11 +9,11 @@ from harness.results.findings import MarginalContribution, StationNames
 
 Group = tuple[MarginalContribution, ...]
 """Contributions that were measured in one way."""
-TOLD_NOTE = "Pale: cannot be told from zero, corrected for the number of places (Holm 1979)."
+SIGNIFICANCE_NOTE = "Pale: cannot be told from zero, corrected for the number of places (Holm 1979)."
 """What pictures of contributions say about pale marks."""
 
 
-def told_from_zero(rows: Sequence[MarginalContribution]) -> frozenset[str]:
+def significant_candidates(rows: Sequence[MarginalContribution]) -> frozenset[str]:
     """The candidates whose contribution differs from zero, corrected for the number of candidates (Holm 1979).
 
     The p of a candidate is that of a t test with the standard error that its interval implies. So of candidates that do
