@@ -176,7 +176,7 @@ def test_errors_of_names_are_those_of_the_registry(folder: Path) -> None:
     write_method(folder, "angle = 0.0")
     with pytest.raises(UnknownName, match="Did you mean 'Mine'"):
         resolve_method("mine:Mne", Isolation())
-    with pytest.raises(UnknownName, match="no module in .* called 'nowhere'"):
+    with pytest.raises(UnknownName, match=r"no module in .* called 'nowhere'"):
         resolve_method("nowhere:Mine", Isolation())
     write_method(folder, "return (")
     with pytest.raises(BadInput, match="SyntaxError"):
