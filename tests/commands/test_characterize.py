@@ -89,7 +89,7 @@ def test_bad_input_is_refused_in_one_line(rig: Path, walking: Path, tmp_path: Pa
         ((rig, "--minutes", "3"), "--minutes"),
         ((rig, "--yes"), "--yes"),
         ((rig, "--baud", "9600"), "--baud"),
-        ((rig, "--out", tmp_path / "no" / "unit.toml"), "folder"),
+        ((rig, "--out", text / "unit.toml"), "text.toml"),
     ):
         said = command("characterize", *words, code=2)
         assert said.out == "refused\n", words
