@@ -75,6 +75,7 @@ def look_at_pages(browser: Any, site: Path, width_px: int, scheme: str) -> list[
     """Every page of a site in a view of a width."""
     wrong: list[str] = []
     view = browser.new_page(viewport={"width": width_px, "height": 900}, color_scheme=scheme)
+    view.set_default_timeout(240_000)  # as a busy machine needs
     seen = []
     with served(site) as address:
         view.on("request", lambda r: None if r.url.startswith((address, "data:")) else wrong.append(r.url))

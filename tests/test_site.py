@@ -51,6 +51,7 @@ def test_every_page_is_whole_and_none_is_a_scroll(site: Path, browser: Any) -> N
 def test_a_reader_chooses_light_and_finds_the_type_of_a_signature(site: Path, browser: Any) -> None:
     with served(site) as address:
         view = browser.new_page(viewport={"width": 1400, "height": 900}, color_scheme="dark")
+        view.set_default_timeout(240_000)
         view.goto(f"{address}/index.html")
         assert "invert" in view.evaluate("getComputedStyle(document.querySelector('.col-md-9 img')).filter")
         view.click("#theme-menu")
