@@ -12,7 +12,7 @@ from harness.errors import BadInput, UnknownName
 class VerbParser(argparse.ArgumentParser):
     """Raises UnknownName and BadInput where argparse prints the usage and exits."""
 
-    def parse_known_args(  # type: ignore[override]
+    def parse_known_args(  # type: ignore[override]  # argparse has overloads for other namespaces
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
         words = list(sys.argv[1:] if args is None else args)
