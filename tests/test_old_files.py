@@ -3,7 +3,6 @@
 import csv
 import json
 import shutil
-import tarfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -24,8 +23,8 @@ from harness.stream.recording import RecordingStream, read_recording
 from harness.study.trust.plan import plan_digest
 from harness.study.trust.trust_study import run_trust_study
 from tests.command import Command
+from tests.verb_examples import unpack_files
 
-ARCHIVE = Path(__file__).parent / "old_files" / "23b301b7.tar.xz"
 PLAN_DIGEST = "269190c444c3be8bc1188b42a66241bbcbd133ec0ded2d66d79586bcfb948b14"
 STATIONS = ("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head")
 ERRORS_MM = {
@@ -40,8 +39,7 @@ ERRORS_MM = {
 @pytest.fixture
 def old(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with the files, which is also the working folder."""
-    with tarfile.open(ARCHIVE) as archive:
-        archive.extractall(tmp_path, filter="data")
+    unpack_files(tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -21,6 +21,7 @@ def add_report(verbs: Verbs) -> None:
 
 
 def run_report(args: argparse.Namespace) -> Outcome:
+    from harness.report.kit import read_page
     from harness.results.files import require_kind
 
     kind = require_kind(args.run, "run", "sweep", "placement", "paper")
@@ -30,6 +31,8 @@ def run_report(args: argparse.Namespace) -> Outcome:
         raise BadInput("--methods without --readme.", "The page has all methods; name the file of the table.")
     if args.methods:
         require_kind(args.run, "run")
+    if args.readme:
+        read_page(args.readme)  # before a page that takes long
     if kind != "run":
         return {"sweep": _report_sweep, "placement": _report_placement, "paper": _report_paper}[kind](args)
     from harness.report.run.losses import loss_sentence

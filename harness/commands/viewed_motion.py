@@ -108,7 +108,9 @@ def _view_run(folder: Path, methods: Sequence[str] | None) -> ViewedMotion:
     """The clips of a run, each read when it is first looked at; UnknownName for a method that the run lacks."""
     from harness.report.run.data import read_summary_only
     from harness.report.run.player_data import group_rows, make_clip
+    from harness.results.files import require_kind
 
+    require_kind(folder, "run")
     run = read_summary_only(folder)
     for name in methods or ():
         if name not in run.series:

@@ -39,6 +39,7 @@ from harness.results.files import (
     file_digest,
     insert_digest,
     read_summary_json,
+    require_kind,
     write_result_json,
 )
 from harness.score import DEFINITIONS
@@ -59,7 +60,7 @@ def write_baseline(run: Path, name: str, folder: Path = BASELINES, force: bool =
             "Use up to 100 letters, digits, - _ and ., as in main_2.",
         )
     if not run.is_dir():
-        raise BadInput(f"{run} is not a folder.", "Name one that `harness run` or `harness sweep` wrote.")
+        require_kind(run, "run", "sweep")
     results, target = load_results(run), folder / name
     if missing := results.planned - len(results.cells):
         raise BadInput(

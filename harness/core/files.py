@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from harness.core import parsing
 from harness.core.fault_report import is_system_fault
+from harness.core.file_kind import wrong_file
 from harness.core.input_file import MEGABYTE, read_input_file
 from harness.core.output_place import place_fault
 from harness.errors import BadFile
@@ -213,7 +214,7 @@ def parse_json(path: Path, data: bytes, expected: str, advice: str) -> dict[str,
     try:
         content = parsing.parse_json(data.decode("utf-8"))
     except ValueError as error:
-        raise BadFile(path, f"not JSON: {error}", expected, advice) from error
+        raise wrong_file(path, f"not JSON: {_text_fault(error)}", expected, advice) from error
     if not isinstance(content, dict):
         raise BadFile(path, f"a JSON {type(content).__name__}", expected, advice)
     return content
@@ -232,7 +233,12 @@ def parse_toml(path: Path, data: bytes, expected: str, advice: str) -> dict[str,
     try:
         return parsing.parse_toml(data.decode("utf-8").replace("\r\n", "\n"))
     except ValueError as error:
-        raise BadFile(path, f"not TOML: {error}", expected, advice) from error
+        raise wrong_file(path, f"not TOML: {_text_fault(error)}", expected, advice) from error
+
+
+def _text_fault(error: ValueError) -> str:
+    """What is wrong with a text that cannot be parsed."""
+    return f"byte {error.start + 1} is not UTF-8" if isinstance(error, UnicodeDecodeError) else str(error)
 
 
 def require_writable(path: Path, what: str, *, force: bool) -> None:

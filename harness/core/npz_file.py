@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.core.file_kind import wrong_file
 from harness.core.input_file import MEGABYTE, check_input_file
 from harness.errors import BadFile
 
@@ -60,7 +61,7 @@ def read_npz(
                     raise BadFile(path, "an archive that unpacks to more than that", limit, advice)
                 return {info.filename[:-4]: _read_array(path, archive, info, expected, advice) for info in wanted}
     except _ARCHIVE_ERRORS as error:
-        raise BadFile(path, f"a broken archive ({error})", expected, advice) from error
+        raise wrong_file(path, f"a broken archive ({error})", expected, advice) from error
 
 
 def read_npy_header(file: BinaryIO) -> tuple[tuple[int, ...], bool, "np.dtype[Any]"]:

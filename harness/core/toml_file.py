@@ -13,6 +13,7 @@ from typing import Any
 
 import tomli_w
 
+from harness.core.file_kind import check_toml_kind
 from harness.core.files import MAX_TOML_BYTES, parse_toml
 from harness.core.input_file import read_input_file
 from harness.errors import BadFile
@@ -47,6 +48,7 @@ def read_digested_toml(path: Path, expected: str, advice: str) -> tuple[dict[str
     """
     data = read_input_file(path, expected, MAX_TOML_BYTES, advice).replace(b"\r\n", b"\n")
     content = parse_toml(path, data, expected, advice)
+    check_toml_kind(path, content, expected, advice)
     stored, schema = content.pop(_KEY, None), content.get("schema")
     if schema == EARLIER_SCHEMA and not isinstance(schema, bool) and stored is None:
         return content, "an earlier version wrote it without a digest: not every lost line in it is noticed"

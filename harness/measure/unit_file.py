@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from harness.core.fields import build
+from harness.core.file_kind import check_toml_kind
 from harness.core.files import write_output
 from harness.core.number_format import Interval
 from harness.core.toml_file import EARLIER_SCHEMA, SCHEMA, format_toml, insert_toml_digest, read_digested_toml
@@ -82,8 +83,7 @@ def read_unit_file(path: Path | str) -> UnitFile:
     """
     path = Path(path)
     content, caveat = read_digested_toml(path, UNIT_FILE, _ADVICE)
-    if content.get("kind") != "unit":
-        raise BadFile(path, f"kind {content.get('kind')!r}", 'a unit file with kind = "unit"', _ADVICE)
+    check_toml_kind(path, content, UNIT_FILE, _ADVICE, needs_kind="unit")
     try:
         tables = build(_UnitTables, content, "unit")
         for name, value in tables.components.items():

@@ -4,12 +4,15 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+from harness.core.file_kind import wrong_file
 from harness.core.motion import Clip
 from harness.core.skeleton import unwrap_angles
 from harness.errors import BadFile, BadInput
 from harness.mocap.index import rate_from_index, unknown_rate_error
+from harness.mocap.read.file_checks import check_size
 
 CLIP_FORMATS = ("amc", "bvh", "mvnx", "npz", "c3d")
+_EXPECTED = f"a motion file ({', '.join(f'.{suffix}' for suffix in CLIP_FORMATS)})"
 """Suffixes of motion files, the preferred one first. C3D files hold markers and cannot be read as a clip."""
 CMU_NAME = re.compile(r"(\d+_\d+)(_poses|_stageii)?")
 """Subject and trial of CMU's library ("13_17"), with the endings that AMASS adds."""
@@ -71,12 +74,9 @@ def motion_format(path: Path) -> str:
     if kind == "asf":
         raise BadInput(f"{path.name} is a skeleton without motion.", "Name an AMC file of it.")
     if kind not in CLIP_FORMATS:
-        raise BadFile(
-            path,
-            "a folder" if path.is_dir() else f"the suffix {path.suffix!r}",
-            ", ".join(f".{known}" for known in CLIP_FORMATS),
-            "Rename it?",
-        )
+        check_size(path, _EXPECTED)
+        advice = "A motion file needs the suffix of its format."
+        raise wrong_file(path, f"the suffix {path.suffix!r}", _EXPECTED, advice)
     return kind
 
 

@@ -13,7 +13,7 @@ from harness.errors import BadFile, BadInput, MissingExtra, UnknownName
 from harness.results.cell import Cell, cell_folder, read_content, row_of_content
 from harness.results.files.content_types import find_impossible_metric
 from harness.results.files.digests import check_file, check_key, read_result_json
-from harness.results.files.folder_kind import BASELINES, CELLS_FILE
+from harness.results.files.folder_kind import BASELINES, CELLS_FILE, require_kind
 from harness.results.files.integrity import check_folder, check_row
 from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.manifest import Manifest, flatten
@@ -83,6 +83,8 @@ def load_results(where: Path | str) -> ResultSet:
     folder = Path(where)
     check_words(folder)
     if not folder.is_dir():
+        if folder.exists():
+            require_kind(folder, "run", "sweep", "baseline")
         known = sorted(path.parent.name for path in BASELINES.glob(f"*/{CELLS_FILE}"))
         if folder.name != str(where):
             raise BadFile(folder, "no such folder", "a run, a sweep or a baseline", "`harness run` writes one.")

@@ -172,7 +172,7 @@ def line(key: str, value: str) -> Callable[[str], str]:
         (without("ltibia"), "ltibia: missing"),
         (lambda text: text.replace("ltibia", "ltail"), "ltail, ltibia: missing, or not one of"),
         (lambda text: text[: text.index("[station")] + "[station]\n", "no stations"),
-        (lambda text: "\x00" + text, "not TOML"),
+        (lambda text: "\x00" + text, "binary data"),
     ],
 )
 def test_what_cannot_be_true_is_refused(

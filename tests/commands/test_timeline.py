@@ -89,7 +89,7 @@ def test_order_and_labels(here: Path, command: Command) -> None:
     ("words", "said"),
     [
         ("all/ra", "1 result"),
-        ("nothing", "nothing holds no result"),
+        ("nothing", "nothing: no results of the harness; expected a run, a sweep or a baseline"),
         ("all --methods rigde", "Did you mean 'ridge'"),
         ("all --metrics mpjpe_m", "Did you mean 'mpjpe_mm'"),
         ("all --order comit", "Did you mean 'commit'"),

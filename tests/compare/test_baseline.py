@@ -143,7 +143,7 @@ def test_runs_with_holes_make_no_baseline(baselines: Path, tmp_path: Path) -> No
     empty = write_run(tmp_path / "empty", replace(side(), cells=(), planned=0))
     with pytest.raises(BadInput, match="no cells"):
         write_baseline(empty, "main")
-    with pytest.raises(BadInput, match="not a folder"):
+    with pytest.raises(BadFile, match="no such folder; expected a run or a sweep"):
         write_baseline(tmp_path / "nowhere", "main")
     assert not baselines.exists()
 

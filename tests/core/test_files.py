@@ -111,7 +111,7 @@ def test_a_folder_moves_where_nothing_is(tmp_path: Path) -> None:
     ("data", "complaint"),
     [
         (b"a = ", "not TOML: Invalid value"),
-        (b"a = \xff", "not TOML: 'utf-8' codec"),
+        (b"a = \xff", "not TOML: byte 5 is not UTF-8"),
         (b"a = " + 10_000 * b"[", "not TOML: "),
         (b"#" * (files.MAX_TOML_BYTES + 1), "1,048,577 bytes; expected a scenario of at most 1,048,576 bytes"),
     ],

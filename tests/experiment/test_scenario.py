@@ -154,7 +154,7 @@ def test_a_scenario_that_does_not_exist_is_refused(tmp_path: Path) -> None:
 def test_a_binary_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "binary.toml"
     path.write_bytes(bytes(range(256)))
-    with pytest.raises(BadFile, match="not TOML"):
+    with pytest.raises(BadFile, match="binary data; expected a scenario"):
         load_scenario(path)
 
 

@@ -51,7 +51,7 @@ def test_a_key_that_was_not_measured_has_no_interval(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('kind = "unit"', 'kind = "run"', "kind 'run'"),
+        ('kind = "unit"', 'kind = "run"', "kind = 'run'"),
         ("schema = 2", "schema = 3", "schema 3"),
         ("[tracker]", "[trackers]", "trackers"),
         ("0.00069, 0.00071, 1000]", "0.00072, 0.00071, 1000]", "interval"),

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from harness.core import files
+from harness.core.file_kind import wrong_file
 from harness.errors import BadFile, BadInput
 from harness.results.files import BASELINES, insert_digest, read_result_json
 
@@ -106,7 +107,8 @@ def read_errors(path: Path) -> StoredErrors:
     """Read the errors that `write_errors` wrote; BadFile when the file is missing, damaged, edited or malformed."""
     content = read_result_json(path, _EXPECTED, _ADVICE)
     if content.get("schema") != SCHEMA:
-        raise BadFile(path, f"schema {content.get('schema')}", f"schema {SCHEMA}", _ADVICE)
+        found = "no schema" if "schema" not in content else f"schema {content['schema']!r}"
+        raise wrong_file(path, found, f"{_EXPECTED} (schema {SCHEMA})", _ADVICE)
     try:
         seeds = tuple(_seed(value) for value in content["seeds"])
         conditions = {

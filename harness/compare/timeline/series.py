@@ -19,7 +19,7 @@ from harness.core.arrays import Floats
 from harness.core.files import content_key
 from harness.errors import BadInput, UnknownName
 from harness.results import CellResult, ResultSet, load_results
-from harness.results.files import CELLS_FILE
+from harness.results.files import CELLS_FILE, require_kind
 from harness.score import DEFINITIONS
 
 ORDERS = ("commit", "date", "given")
@@ -101,9 +101,9 @@ def build_timeline(
     for metric in metrics:
         margin_of(metric)
     sides = name_sides([folder for word in words for folder in _list_results(word)])
+    loaded = [(_entry(name, where, results), results) for name, where in sides for results in [load_results(where)]]
     if len(sides) < 2:
         raise BadInput(f"{', '.join(words)}: {len(sides)} result.", "Name two or more, or a folder that holds them.")
-    loaded = [(_entry(name, where, results), results) for name, where in sides for results in [load_results(where)]]
     chosen, loaded = _sort(loaded, order)
     known = dict.fromkeys(cell.method for _, results in loaded for cell in results.cells)
     for method in methods:
@@ -123,7 +123,7 @@ def _list_results(word: str) -> list[str]:
         return [word]
     inside = sorted(str(path) for path in folder.iterdir() if path.is_dir() and _is_result(path))
     if not inside:
-        raise BadInput(f"{word} holds no result.", "Name folders of runs or baselines, or a folder that holds them.")
+        require_kind(folder, "run", "sweep", "baseline")
     return inside
 
 

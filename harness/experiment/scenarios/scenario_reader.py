@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.fields import NONE, build
+from harness.core.file_kind import check_toml_kind
 from harness.core.files import MAX_TOML_BYTES, read_toml
 from harness.core.input_file import check_input_file, names_input_file
 from harness.core.options import expand_alternatives
@@ -38,9 +39,9 @@ class ScenarioFile:
     def scenario(self) -> Scenario:
         """The scenario, checked; with its set of stations, its measured unit and its constellation read."""
         path = self.path
-        content = read_toml(path, "a scenario", "`harness list` names the shipped ones.")
-        if content.get("kind") == "placement":
-            raise BadFile(path, "a placement study", "a scenario", "Run it with `harness placement`.")
+        expected, advice = "a scenario", "`harness list` names the shipped ones."
+        content = read_toml(path, expected, advice)
+        check_toml_kind(path, content, expected, advice)
         content.setdefault("name", path.stem)
         with name_file(path):
             try:

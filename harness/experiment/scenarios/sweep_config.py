@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from harness.core.fields import build
+from harness.core.file_kind import check_toml_kind
 from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
@@ -41,8 +42,7 @@ def load_sweep(path: Path | str) -> tuple[Sweep, Path]:
     advice = "Shipped ones are in scenarios/sweeps/."
     path = find_config(path, "sweep", Path("scenarios/sweeps"), shipped_sweeps(), advice)
     content = read_toml(path, _EXPECTED, _ADVICE)
-    if "motion" in content:
-        raise BadFile(path, "a scenario", _EXPECTED, "`harness run` runs it; a sweep names it in `scenarios`.")
+    check_toml_kind(path, content, _EXPECTED, _ADVICE)
     content.setdefault("name", path.stem)
     try:
         with name_file(path):

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from harness.core.file_kind import wrong_file
 from harness.core.input_file import check_input_file, read_input_file
 from harness.errors import BadFile
 
@@ -35,7 +36,7 @@ def read_lines(path: Path, expected: str, limit_bytes: int = LIMIT_BYTES) -> lis
     check_size(path, expected, limit_bytes)
     data = read_input_file(path, expected, limit_bytes)
     if b"\0" in data:
-        raise BadFile(path, "binary data", expected, "Is it another format under this name?")
+        raise wrong_file(path, "binary data", expected, "Is it another format under this name?")
     if not data.strip():
         raise BadFile(path, "blank lines only", expected, "Fetch or export it again.")
     return data.decode("latin-1").replace("\r\n", "\n").replace("\r", "\n").split("\n")

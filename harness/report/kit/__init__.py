@@ -7,6 +7,7 @@ from harness.core.door import lazy_names
 if TYPE_CHECKING:
     from harness.report.kit.chart import draw_chart
     from harness.report.kit.document import html_document, page_style
+    from harness.report.kit.marked_block import read_page
     from harness.report.kit.markup import Markup, join, tag
     from harness.report.kit.motion_player import (
         NO_ESTIMATE,
@@ -56,6 +57,7 @@ __all__ = [
     "player_card",
     "player_element",
     "player_script",
+    "read_page",
     "render_html",
     "render_text",
     "start_renderer",

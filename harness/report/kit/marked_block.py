@@ -4,30 +4,36 @@ import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from harness.core.file_kind import wrong_file
 from harness.core.files import write_text
 from harness.core.input_file import MEGABYTE, read_input_file
 from harness.errors import BadFile
 
-_NEWLINE = "\n"
+_EXPECTED, _NEWLINE = "a text file with both markers or none", "\n"
+
+
+def read_page(page: Path) -> str:
+    """The text of a page that `replace_block` may change; BadFile if it is no text that can be read."""
+    advice = "Name README.md or results/README.md."
+    data = read_input_file(page, _EXPECTED, 16 * MEGABYTE, advice)
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise wrong_file(page, f"byte {error.start + 1} is not UTF-8", _EXPECTED, advice) from error
 
 
 def replace_block(page: Path, label: str, lines: Iterable[str]) -> None:
     """Put `lines` between the markers of `label` in `page`, or append them with their markers; no other byte changes.
 
-    No line can end the block. BadFile if the page cannot be read, or if the two markers are not there exactly once and
-    in order.
+    No line can end the block. BadFile as `read_page`, and if the two markers are not there exactly once and in order.
     """
-    expected, advice = "a text file with both markers or none", "Name README.md or results/README.md."
-    try:
-        text = read_input_file(page, expected, 16 * MEGABYTE, advice).decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise BadFile(page, f"cannot be read ({error})", expected, advice) from error
+    text = read_page(page)
     name = re.sub(r"[^\w. ]+", "-", label).strip("-")
     start, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
     block = "\n".join([start, *map(_escape_markers, lines), end])
     if text.count(start) != text.count(end) or text.count(start) > 1 or text.find(start) > text.find(end):
         why = f"the markers {start} and {end} do not occur once each in this order"
-        raise BadFile(page, why, expected, "Restore both markers, or remove both to append the tables at the end.")
+        raise BadFile(page, why, _EXPECTED, "Restore both markers, or remove both to append the tables at the end.")
     if start in text:
         before, _, rest = text.partition(start)
         updated = before + block + rest.partition(end)[2]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from harness.core.file_kind import wrong_file
 from harness.core.files import read_json
 from harness.errors import BadFile, BadInput
 from harness.results.files.digests import STUDY_FILE
@@ -68,7 +69,7 @@ def require_kind(out: Path, *kinds: str) -> str:
     expected = f"{', '.join(others)} or {last}" if others else last
     if not out.is_dir():
         found = "a file, not a folder" if out.exists() else "no such folder"
-        raise BadFile(out, found, expected, _KINDS[""][1])
+        raise wrong_file(out, found, expected, _KINDS[""][1])
     if (kind := folder_kind(out)) not in kinds:
         found, advice = _KINDS.get(kind, _KINDS[""])
         raise BadFile(out, found, expected, advice)

@@ -33,6 +33,7 @@ import numpy as np
 
 from harness.core.fault_report import is_system_fault
 from harness.core.fields import build
+from harness.core.file_kind import wrong_file
 from harness.core.input_file import MEGABYTE, open_input_file, read_input_file
 from harness.core.interrupts import defer_interrupts
 from harness.core.parsing import parse_json
@@ -243,7 +244,7 @@ def _check_kind(path: Path, data: bytes) -> None:
         and not FILE_HEADER.startswith(data)
         and all(isinstance(entry, DamagedSpan) for entry in read_blocks(data, 0))
     ):
-        raise BadFile(path, "no recording", EXPECTED_FILE, "Is it the right file? Nothing was changed in it.")
+        raise wrong_file(path, "no recording", EXPECTED_FILE, "Is it the right file? Nothing was changed in it.")
 
 
 class RecordingWriter:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from harness.compare import MARGINS
 from harness.core.fields import build
+from harness.core.file_kind import check_toml_kind
 from harness.core.files import read_toml
 from harness.core.input_file import names_input_file
 from harness.core.options import expand_alternatives
@@ -172,8 +173,7 @@ def load_placement_study(path: Path | str) -> PlacementStudy:
     path = find_placement_study(path)
     expected, advice = "a placement study", "See scenarios/placement/walking.toml."
     content = read_toml(path, expected, advice)
-    if content.get("kind") != "placement":
-        raise BadFile(path, f"kind = {content.get('kind', 'scenario')!r}", f'{expected}, kind = "placement"', advice)
+    check_toml_kind(path, content, expected, advice, needs_kind="placement")
     content.setdefault("name", path.stem)
     with name_file(path):
         try:

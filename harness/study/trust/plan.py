@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 
 from harness.compare import MARGINS, TIME_METRICS
 from harness.core.fields import build
+from harness.core.file_kind import check_toml_kind
 from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.ranges import MethodName, Name, Range, Text, check_fields
@@ -75,8 +76,7 @@ def load_plan(path: Path) -> Plan:
     Sets of stations are never empty afterwards. BadFile, BadInput and UnknownName name the place.
     """
     content = read_toml(path, _EXPECTED, _ADVICE)
-    if content.get("kind") != KIND:
-        raise BadFile(path, f"kind = {content.get('kind')!r}", f'{_EXPECTED}, kind = "{KIND}"', _ADVICE)
+    check_toml_kind(path, content, _EXPECTED, _ADVICE, needs_kind=KIND)
     if not content.get("margins"):
         raise BadFile(path, "no margins", "a table [margins], metric = margin", _ADVICE)
     with name_file(path):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.errors import BadInput, NotComparable
+from harness.errors import BadFile, BadInput, NotComparable, UnknownName
 from harness.experiment import find_playback
 from harness.experiment.scenarios import Scenario, load_scenario
 from harness.measure import LEAST_OVERLAP_S, TruthSpline, coarse_offset, record_period_s
@@ -41,7 +41,12 @@ def load_truth(capture: CaptureReadings, source: TruthSource) -> TruthMotion:
         return truth_of_clip(read_clip(path), _scenario_of(capture, source), capture.stations)
     if path.is_file():
         return truth_of_capture(read_capture(CaptureReader(path)), capture.stations)
-    return _truth_of_scenario(capture, source)
+    try:
+        return _truth_of_scenario(capture, source)
+    except UnknownName as error:
+        if error.name != source.name or not suffix:
+            raise
+        raise BadFile(path, "no such file", "a clip, or a file with a reference", "Check the path.") from error
 
 
 def _scenario_of(capture: CaptureReadings, source: TruthSource) -> Scenario:

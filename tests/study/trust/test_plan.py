@@ -49,7 +49,7 @@ def test_without_sets_all_stations_are_one_set(tmp_path: Path) -> None:
     ("old", "new", "error", "words"),
     [
         ("[margins]\njoint_angle_mean_deg = 0.5\nmpjpe_mm = 5\n", "", BadFile, "no margins"),
-        ('kind = "trust plan"', 'kind = "placement"', BadFile, "kind = 'placement'"),
+        ('kind = "trust plan"', 'kind = "placement"', BadFile, "a placement study; expected a trust plan"),
         ("mpjpe_mm = 5", "mpjpe_mm = -5", BadFile, "mpjpe_mm"),
         ("mpjpe_mm = 5", "step_mean_ms = 5", UnknownName, "step_mean_ms"),
         ('"head", "torso"', '"head", "tail"', UnknownName, "tail"),

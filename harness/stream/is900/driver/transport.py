@@ -81,6 +81,8 @@ def serial_port_error(port: str, baud: int, error: Exception) -> BadInput:
         )
     if number in (*_BUSY_ERRNOS, errno.EACCES):
         return BadInput(f"Port {port}: another program has it open.", "Close that program; only one may use the port.")
+    if os.path.isfile(port):
+        return BadInput(f"Port {port}: a file, not a port.", "Name the port of the device, such as /dev/ttyUSB0.")
     return BadInput(
         f"Port {port} cannot be used as a serial port: {_error_text(error)}.", "Name the port of the device."
     )
