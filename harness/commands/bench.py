@@ -6,7 +6,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.commands.flags import Verbs, add_verb, positive_int, process_count, refuse_flags_of_others
+from harness.commands.flags import (
+    Verbs,
+    add_verb,
+    folder_of,
+    output_file,
+    positive_int,
+    process_count,
+    refuse_flags_of_others,
+)
 from harness.commands.output import long_work, print_result, this_command
 from harness.core.progress import ProgressBar, show_steps
 from harness.errors import BadInput, Outcome
@@ -23,7 +31,7 @@ LAB = "lab"
 SPEED = "speed"
 _FLAGS_BY_USE = {
     SPEED: ("seed", "large", "runs"),
-    ACCURACY: ("method", "seeds", "jobs", "out", "mocap", "baseline", "save", "quick"),
+    ACCURACY: ("method", "seeds", "jobs", "out", "mocap", "baseline", "save", "quick", "force"),
     RANKING: ("quick", "jobs", "out", "mocap"),
     "physics --truth": ("seeds", "out"),
     "lab --truth": ("seeds", "out", "jobs"),
@@ -33,7 +41,7 @@ _FLAGS_BY_USE = {
 
 def add_bench(verbs: Verbs) -> None:
     text = "measure speed on this machine, or a method's accuracy against stored errors"
-    verb = add_verb(verbs, "bench", text, run_bench, "seed", "out", "mocap")
+    verb = add_verb(verbs, "bench", text, run_bench, "seed", "out", "mocap", "force")
     text = (
         "methods, ik, index, outliers, wire, stream, physics, lab, gate, sweep, startup, performers "
         "(default: all); accuracy; or ranking: do methods and places rank alike on built-in and real motion?"
@@ -58,7 +66,7 @@ def add_bench(verbs: Verbs) -> None:
     verb.add_argument("--jobs", type=process_count, metavar="N", help=text)
     text = "accuracy: stored errors to compare with (default: those of dynamic_map of commit 40f3d61)"
     verb.add_argument("--baseline", type=Path, metavar="FILE", help=text)
-    verb.add_argument("--save", type=Path, metavar="FILE", help="accuracy: store the errors of the method in FILE")
+    verb.add_argument("--save", type=output_file, metavar="FILE", help="accuracy: store the method's errors in FILE")
     text = "accuracy: one seed, three clips, no verdict (exit code 3); ranking: two performers, three methods and sets"
     verb.add_argument("--quick", action="store_true", default=None, help=text)
 
@@ -129,7 +137,7 @@ def _bench_physics_truth(args: argparse.Namespace) -> Outcome:
     from harness.report.physics.error_comparison import ErrorModelComparison
     from harness.report.physics.page import write_physics_page
 
-    seeds, out = _first_seeds(args, SEEDS), args.out or Path("results") / "physics"
+    seeds, out = _first_seeds(args, SEEDS), folder_of(args, "physics")
     with ProgressBar("rows") as progress:
         rows = truth_rows(seeds, progress)
         models = compare_error_models(seeds, progress)
@@ -144,7 +152,7 @@ def _bench_lab_truth(args: argparse.Namespace) -> Outcome:
     from harness.bench.lab.truth import SEEDS, lab_truth_rows
     from harness.experiment.workers import process_executor
 
-    seeds, out = _first_seeds(args, SEEDS), args.out or Path("results") / LAB
+    seeds, out = _first_seeds(args, SEEDS), folder_of(args, LAB)
     with long_work(out, "captures") as progress, process_executor(args.jobs or 1) as executor:
         rows = lab_truth_rows(seeds, out, executor, progress)
     return _print_statements(args, rows, {"seeds": len(seeds), "captures": str(out / "captures")})
@@ -155,10 +163,13 @@ def _bench_accuracy(args: argparse.Namespace) -> Outcome:
     from harness.bench.accuracy.conditions import DEFAULT_METHOD, SEEDS
     from harness.bench.accuracy.measurement import clean_commit, measure_accuracy
     from harness.bench.accuracy.text import format_report, report_content
+    from harness.core.files import require_writable
 
     if args.quick and (args.save or args.seeds):
         raise BadInput("--quick has one seed and few clips.", "Leave out --save and --seeds, or leave out --quick.")
     seeds = _first_seeds(args, SEEDS)
+    if args.save:
+        require_writable(args.save, "errors by clip", force=args.force)
     commit = clean_commit() if args.save else ""
     stored, method = read_errors(args.baseline or DEFAULT_BASELINE), args.method or DEFAULT_METHOD
     with _cells(args, ACCURACY) as options:
@@ -182,7 +193,7 @@ def _cells(args: argparse.Namespace, name: str) -> Iterator[dict[str, Any]]:
     """Options with which a benchmark runs the cells of scenarios in its folder."""
     from harness.experiment.workers import process_executor
 
-    jobs, out = args.jobs or 1, args.out or Path("results") / name
+    jobs, out = args.jobs or 1, folder_of(args, name)
     with long_work(out, "cells") as bar, process_executor(jobs) as executor:
         yield {
             "out": out,

@@ -13,6 +13,7 @@ from harness.commands.flags import (
     add_line_flags,
     add_verb,
     line_options,
+    output_file,
     output_folder,
     parse_names,
     positive_int,
@@ -56,7 +57,7 @@ def add_calibrate(verbs: Verbs) -> None:
     text = "poses: eight poses, for bone lengths and mounts; tpose: one, for mounts on a known body (default poses)"
     verb.add_argument("--kind", choices=["poses", "tpose"], help=text)
     verb.add_argument("--clip", help="with tpose: clip of the performer (default: the scenario's first)")
-    verb.add_argument("--out", type=Path, metavar="FILE", help="calibration file to write, in TOML")
+    verb.add_argument("--out", type=output_file, metavar="FILE", help="calibration file to write, in TOML")
     add_line_flags(verb)
     text = "show the poses in a window, or as PNG files in the folder --pictures"
     verb.add_argument("--view", choices=["window", "frames"], help=text)

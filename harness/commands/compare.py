@@ -1,9 +1,8 @@
 """The verb `compare`: tell whether one result is worse than another."""
 
 import argparse
-from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, split_list
+from harness.commands.flags import Verbs, add_verb, output_file, split_list
 from harness.commands.output import print_result, record_content, this_words
 from harness.core.progress import show_steps
 from harness.errors import BadInput, Outcome
@@ -23,15 +22,18 @@ def add_compare(verbs: Verbs) -> None:
     verb.add_argument("--metrics", metavar="M,N", help="metrics that decide the outcome (see `harness list`)")
     text = "let these conditions, `coverage` or `cells` (without a partner) differ; without names, everything"
     verb.add_argument("--allow", metavar="NAME,NAME", nargs="?", const=_EVERYTHING, help=text)
-    verb.add_argument("--html", metavar="FILE", type=Path, help="also write a page that shows every clip")
+    verb.add_argument("--html", metavar="FILE", type=output_file, help="also write a page that shows every clip")
 
 
 def run_compare(args: argparse.Namespace) -> Outcome:
     from harness.compare import compare_sides, name_sides
     from harness.report.comparison.page import comparison_text, write_comparison_page
     from harness.report.comparison.set_page import set_text, write_set_page
+    from harness.report.kit import check_page_place
 
     methods = split_list(args.methods)
+    if args.html:
+        check_page_place(args.html)
     if len(args.sides) == 1 and not methods:
         raise BadInput(f"{args.sides[0]} alone.", "Name two results, or two methods of one with --methods a,b.")
     found = compare_sides(

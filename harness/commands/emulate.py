@@ -3,12 +3,12 @@
 import argparse
 import shlex
 from contextlib import ExitStack, closing
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.commands.flags import (
     Verbs,
     add_verb,
+    output_link,
     parse_characters,
     parse_items,
     positive_float,
@@ -36,7 +36,7 @@ def add_emulate(verbs: Verbs) -> None:
     verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
     where = verb.add_mutually_exclusive_group(required=True)
     text = "open a pseudo terminal, and link to it under this name"
-    where.add_argument("--pty", type=Path, metavar="LINK", help=text)
+    where.add_argument("--pty", type=output_link, metavar="LINK", help=text)
     where.add_argument("--tcp", metavar="HOST:PORT", help="listen at a TCP port; port 0 takes a free one")
     text = "also broadcast UDP packets from the start, as after MEthUdp1; without HOST, to this computer"
     verb.add_argument("--udp", metavar="[HOST:]PORT", help=text)

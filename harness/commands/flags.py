@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from harness.core.options import expand_alternatives, split_outside_brackets
 from harness.core.output_place import place_fault
-from harness.errors import BadInput, Outcome
+from harness.errors import BadFile, BadInput, Outcome
 
 if TYPE_CHECKING:
     from harness.experiment.methods import Isolation
@@ -152,8 +152,32 @@ def line_options(args: argparse.Namespace, port: str) -> dict[str, Any]:
 
 def output_folder(text: str) -> Path:
     """A folder that can be written, or made, for argparse: a verb that works for long refuses another at once."""
-    if fault := place_fault(Path(text)):
-        raise argparse.ArgumentTypeError(fault)
+    return _place(text, place_fault(Path(text)), "a folder to write")
+
+
+def folder_of(args: argparse.Namespace, name: str) -> Path:
+    """The folder of `--out`, or `results/NAME`; BadFile where that cannot be written."""
+    out: Path = args.out or output_folder(str(Path("results") / name))
+    return out
+
+
+def output_file(text: str) -> Path:
+    """A file that can be written, for argparse; the verb itself refuses one that exists and may not be replaced."""
+    path = Path(text)
+    fault = "it is not a file" if path.exists() and not path.is_file() else place_fault(path.parent)
+    return _place(text, fault, "a file to write")
+
+
+def output_link(text: str) -> Path:
+    """A name for the link of a pseudo terminal, in a folder that exists, for argparse."""
+    folder = Path(text).parent
+    fault = place_fault(folder) or ("" if folder.is_dir() else f"there is no folder {folder}")
+    return _place(text, fault, "a link to make")
+
+
+def _place(text: str, fault: str, expected: str) -> Path:
+    if fault:
+        raise BadFile(text, fault, expected, "Choose another.")
     return Path(text)
 
 

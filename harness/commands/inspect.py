@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, refuse_flags, repeat_flags
+from harness.commands.flags import Verbs, add_verb, output_file, refuse_flags, repeat_flags
 from harness.commands.output import print_result
 from harness.errors import Outcome
 
@@ -30,7 +30,7 @@ def add_inspect(verbs: Verbs) -> None:
         "--stations", metavar="SET", help="set of stations that the performer wears (default liu2011)"
     )
     text = "page to write (default results/coverage/NAME.html, which is replaced)"
-    emitters.add_argument("--out", type=Path, metavar="PAGE", help=text)
+    emitters.add_argument("--out", type=output_file, metavar="PAGE", help=text)
     emitters.add_argument("--force", action="store_true", default=None, help="overwrite a page that --out names")
 
 

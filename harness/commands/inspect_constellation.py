@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.commands.flags import refuse_flags, repeat_flags
+from harness.commands.flags import output_file, refuse_flags, repeat_flags
 from harness.commands.output import print_result, this_command
 from harness.errors import Outcome, UnknownName
 from harness.report.coverage.content import (
@@ -43,7 +43,7 @@ def inspect_constellation(args: argparse.Namespace) -> Outcome:
     refuse_flags(args, ["unit"], f"with {args.file.name}", "An MCF file is in metres.")
     if args.clip is None:
         refuse_flags(args, ["stations", "rate"], "without --clip", "It is for the performer that --clip names.")
-    page = args.out or Path("results") / "coverage" / f"{args.file.stem}.html"
+    page = args.out or output_file(str(Path("results") / "coverage" / f"{args.file.stem}.html"))
     from harness.core.files import require_writable
     from harness.core.progress import report_step, show_steps
     from harness.report.coverage.page import coverage_page

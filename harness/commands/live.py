@@ -14,6 +14,7 @@ from harness.commands.flags import (
     add_line_flags,
     add_verb,
     line_options,
+    output_file,
     output_folder,
     positive_float,
     repeat_flags,
@@ -70,8 +71,8 @@ def add_live(verbs: Verbs) -> None:
     text = "open the streams NAME-qpos and NAME-joints of the Lab Streaming Layer"
     verb.add_argument("--lsl", metavar="NAME", help=text)
     verb.add_argument("--anywhere", action="store_true", help="announce the streams of --lsl to other computers too")
-    verb.add_argument("--bvh", type=Path, metavar="FILE", help="write the motion to a BVH file")
-    verb.add_argument("--poses", type=Path, metavar="FILE", help="write a CSV table of poses and frame times")
+    verb.add_argument("--bvh", type=output_file, metavar="FILE", help="write the motion to a BVH file")
+    verb.add_argument("--poses", type=output_file, metavar="FILE", help="write a CSV table of poses and frame times")
     verb.add_argument("--seconds", type=positive_float, metavar="S", help="stop after S seconds")
     text = "allowed latency from the last byte of a frame to its pose (default: one period of the tracker)"
     verb.add_argument("--deadline", type=positive_float, metavar="MS", help=text)

@@ -1,7 +1,6 @@
 """The verb `mocap`: list a library of real motion, or download one."""
 
 import argparse
-from pathlib import Path
 
 from harness.commands.flags import Verbs, add_verb, output_folder, repeat_flags
 from harness.commands.output import print_result, print_status
@@ -17,7 +16,7 @@ def add_mocap(verbs: Verbs) -> None:
     fetch.add_argument("database", choices=["cmu"], help="the database")
     fetch.add_argument("--subjects", required=True, metavar="13,14", help="CMU's subject numbers")
     text = "folder to write (default mocap)"
-    fetch.add_argument("--out", type=output_folder, default=Path("mocap"), metavar="DIR", help=text)
+    fetch.add_argument("--out", type=output_folder, default="mocap", metavar="DIR", help=text)
     fetch.add_argument("--url", help="address of a mirror with the same layout")
 
 

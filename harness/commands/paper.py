@@ -1,9 +1,8 @@
 """The verb `paper`: rerun the experiments of a paper."""
 
 import argparse
-from pathlib import Path
 
-from harness.commands.flags import Verbs, add_mocap_flag, add_verb, process_count
+from harness.commands.flags import Verbs, add_mocap_flag, add_verb, folder_of, process_count
 from harness.commands.output import long_work, print_result, record_content, this_command, this_words
 from harness.core.progress import show_steps
 from harness.errors import Outcome
@@ -31,7 +30,7 @@ def run_paper(args: argparse.Namespace) -> Outcome:
     paper = load_paper(args.paper)
     paper = paper.only(args.only) if args.only else paper
     form = ("_cmu" if args.mocap else "") + ("_quick" if args.quick else "")
-    out = args.out or Path("results") / (args.paper + form)
+    out = folder_of(args, args.paper + form)
     with long_work(out, "steps") as bar:
         findings, outcome = reproduce(
             paper,

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.flags import Verbs, add_verb, positive_float, positive_int, process_count, refuse_flags
+from harness.commands.flags import Verbs, add_verb, folder_of, positive_float, positive_int, process_count, refuse_flags
 from harness.commands.output import long_work, print_result, print_status, record_content, this_command, this_words
 from harness.core.progress import show_steps
 from harness.errors import BadInput, Outcome
@@ -94,7 +94,7 @@ def run_placement(args: argparse.Namespace) -> Outcome:
 
     question = _read_question(args)
     name = question.name if question else Path(args.study).stem.removeprefix("placement_")
-    out = args.out or Path("results") / f"placement_{name}"
+    out = folder_of(args, f"placement_{name}")
     with long_work(out, "cells") as bar, process_executor(args.jobs) as each:
         findings: PlacementFindings
         findings, outcome = placement_study.run_placement(

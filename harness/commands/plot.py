@@ -4,7 +4,7 @@ import argparse
 import textwrap
 from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, positive_int, repeat_flags, split_list
+from harness.commands.flags import Verbs, add_verb, output_file, positive_int, repeat_flags, split_list
 from harness.commands.output import print_result
 from harness.errors import Outcome
 
@@ -29,7 +29,7 @@ def add_plot(verbs: Verbs) -> None:
     text = "method that time and joints show next to the leader (default: ik)"
     verb.add_argument("--control", default="", metavar="METHOD", help=text)
     text = "file to write with the suffix .pdf, .svg or .png (default: figures/NAME.pdf in the folder of the run)"
-    verb.add_argument("--out", type=Path, metavar="FILE", help=text)
+    verb.add_argument("--out", type=output_file, metavar="FILE", help=text)
     verb.add_argument("--force", action="store_true", help="replace a file that exists")
 
 

@@ -13,6 +13,7 @@ from harness.commands.flags import (
     add_verb,
     is_whole_number,
     line_options,
+    output_link,
     parse_device_names,
     parse_names,
     refuse_flags,
@@ -54,7 +55,7 @@ def add_record(verbs: Verbs) -> None:
         "another program configures and uses the device, at a pseudo terminal under this name, while everything is "
         "recorded"
     )
-    verb.add_argument("--serve", type=Path, metavar="LINK", help=text)
+    verb.add_argument("--serve", type=output_link, metavar="LINK", help=text)
     verb.add_argument("--clip", metavar="CLIP", help="with sim: clip to play (default: the scenario's first)")
     verb.add_argument("--noise", metavar="PRESET", help="with sim: clean, noise or default (default: the scenario's)")
     text = "with sim: play the calibration poses of `harness calibrate` instead of the clip"

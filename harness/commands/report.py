@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, split_list
+from harness.commands.flags import Verbs, add_verb, output_file, split_list
 from harness.commands.output import print_result
 from harness.core.progress import show_steps
 from harness.errors import BadInput, Outcome
@@ -16,7 +16,7 @@ def add_report(verbs: Verbs) -> None:
     )
     verb.add_argument("run", type=Path, help="folder written by `harness run`, `sweep`, `placement` or `paper`")
     text = "also replace the table of this run, or the tables of this paper, in a page such as README.md"
-    verb.add_argument("--readme", type=Path, metavar="FILE", help=text)
+    verb.add_argument("--readme", type=output_file, metavar="FILE", help=text)
     verb.add_argument("--methods", metavar="A,B", help="methods in the table of a run that --readme writes")
 
 

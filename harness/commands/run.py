@@ -1,9 +1,8 @@
 """The verb `run`: run a scenario and write its report."""
 
 import argparse
-from pathlib import Path
 
-from harness.commands.flags import Verbs, add_isolation_flags, add_verb, parse_methods, read_isolation
+from harness.commands.flags import Verbs, add_isolation_flags, add_verb, folder_of, parse_methods, read_isolation
 from harness.commands.output import long_work, print_result, print_status, this_command
 from harness.core.progress import show_steps
 from harness.errors import Outcome
@@ -49,7 +48,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
     if args.methods is not None:
         scenario = replace(scenario, methods=_named_methods(args.methods, scenario.methods))
         check_scenario(args.scenario, scenario)
-    out = args.out or Path("results") / scenario.name
+    out = folder_of(args, scenario.name)
     with long_work(out, "cells") as bar:
         outcome = run(
             scenario,

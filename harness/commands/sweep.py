@@ -7,7 +7,15 @@ import sys
 from contextlib import ExitStack
 from pathlib import Path
 
-from harness.commands.flags import Verbs, add_isolation_flags, add_verb, process_count, read_isolation, repeat_flags
+from harness.commands.flags import (
+    Verbs,
+    add_isolation_flags,
+    add_verb,
+    folder_of,
+    process_count,
+    read_isolation,
+    repeat_flags,
+)
 from harness.commands.output import long_work, print_result
 from harness.core.progress import show_steps
 from harness.errors import BadInput, Outcome
@@ -41,7 +49,7 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
         raise BadInput("--jobs with --dask.", "The scheduler has workers of its own: leave --jobs out.")
     sweep, path = load_sweep(args.sweep)
     scenarios = expand_sweep(sweep, path, args.seed, args.mocap)
-    out = args.out or Path("results") / sweep.name
+    out = folder_of(args, sweep.name)
     with ExitStack() as stack:
         bar = stack.enter_context(long_work(out, "cells"))
         workers = args.jobs or {None: 1, "local": os.cpu_count() or 1}.get(args.dask, _DEFAULT_CLUSTER_WORKERS)

@@ -1,9 +1,8 @@
 """The verb `table`: print the results of a run as a table for a paper."""
 
 import argparse
-from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, repeat_flags, split_list
+from harness.commands.flags import Verbs, add_verb, output_file, repeat_flags, split_list
 from harness.commands.output import print_result
 from harness.errors import Outcome
 
@@ -21,7 +20,7 @@ def add_table(verbs: Verbs) -> None:
     verb.add_argument("--methods", metavar="A,B", help="methods to show (default: all); only these are ranked")
     verb.add_argument("--condition", default="", metavar="NAME", help="condition to show, such as noise=clean")
     verb.add_argument("--by-behaviour", action="store_true", help="a row for each behaviour instead of all together")
-    verb.add_argument("--out", type=Path, metavar="FILE", help="file to write instead of printing")
+    verb.add_argument("--out", type=output_file, metavar="FILE", help="file to write instead of printing")
     verb.add_argument("--force", action="store_true", help="replace a file that exists")
 
 

@@ -1,9 +1,8 @@
 """The verb `timeline`: show results of one scenario over commits or dates, and where they changed."""
 
 import argparse
-from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, split_list
+from harness.commands.flags import Verbs, add_verb, output_file, split_list
 from harness.commands.output import print_result, record_content
 from harness.core.progress import show_steps
 from harness.errors import Outcome
@@ -19,14 +18,16 @@ def add_timeline(verbs: Verbs) -> None:
     text = "commit, date (of the run) or given (default: commit, else date, where all results have different ones)"
     verb.add_argument("--order", metavar="ORDER", help=text)
     text = "page to write, with its comparisons in a folder beside it (default timeline.html)"
-    verb.add_argument("--html", metavar="FILE", type=Path, default=Path("timeline.html"), help=text)
+    verb.add_argument("--html", metavar="FILE", type=output_file, default="timeline.html", help=text)
 
 
 def run_timeline(args: argparse.Namespace) -> Outcome:
     from harness.compare.timeline import build_timeline
+    from harness.report.kit import check_page_place
     from harness.report.timeline.page import timeline_text, write_timeline_page
 
-    metrics = args.metrics.split(",") if args.metrics else None
+    check_page_place(args.html)
+    metrics = split_list(args.metrics) or None
     with show_steps("results and parts of the page"):
         timeline = build_timeline(args.runs, order=args.order, methods=split_list(args.methods), metrics=metrics)
         page = write_timeline_page(timeline, args.html)

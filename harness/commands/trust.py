@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, process_count
+from harness.commands.flags import Verbs, add_verb, folder_of, process_count
 from harness.commands.output import long_work, print_result, record_content, this_command
 from harness.core.progress import show_steps
 from harness.errors import Outcome
@@ -29,7 +29,7 @@ def run_trust(args: argparse.Namespace) -> Outcome:
     from harness.report.lab.trust_page import trust_page
     from harness.study.trust.trust_study import run_trust_study
 
-    out = args.out or Path("results") / f"trust_{args.plan.stem}"
+    out = folder_of(args, f"trust_{args.plan.stem}")
     with long_work(out, "captures") as bar, process_executor(args.jobs) as executor:
         study = run_trust_study(
             args.plan,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from harness.commands.flags import output_file
 from harness.commands.output import print_caveat
 from harness.core.progress import show_steps
 
@@ -35,7 +36,7 @@ class UnitOptions:
 
 def add_unit_flags(verb: argparse.ArgumentParser, out: str) -> None:
     """Add `--out` with this help, `--force` and `--expect`, the flags of `UnitOptions`."""
-    verb.add_argument("--out", type=Path, metavar="FILE", help=out)
+    verb.add_argument("--out", type=output_file, metavar="FILE", help=out)
     verb.add_argument("--force", action="store_true", help="replace a unit file that exists")
     text = "earlier unit file to compare with (default: the noise preset `default`)"
     verb.add_argument("--expect", type=Path, metavar="FILE", help=text)

@@ -7,7 +7,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.commands.flags import Verbs, add_verb, parse_methods, positive_float
+from harness.commands.flags import Verbs, add_verb, output_file, parse_methods, positive_float
 from harness.commands.output import print_result, print_status
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
@@ -31,12 +31,12 @@ def add_view(verbs: Verbs) -> None:
     verb.add_argument("--scenario", metavar="NAME", help=text)
     verb.add_argument("--rate", type=positive_float, metavar="HZ", help="frames per second of an AMC file")
     text = "write a movie of the clip, with up to three methods side by side, instead of opening a browser"
-    verb.add_argument("--save", type=Path, metavar="FILE.mp4|FILE.gif", help=text)
+    verb.add_argument("--save", type=output_file, metavar="FILE.mp4|FILE.gif", help=text)
     verb.add_argument("--from", type=float, dest="start", default=0.0, metavar="S", help="start of the movie")
     verb.add_argument("--to", type=float, dest="end", default=float("inf"), metavar="S", help="end of the movie")
     verb.add_argument("--colour-by-error", action="store_true", help="colour bodies in the movie by their error")
     text = "write one page that holds all of it, instead of opening a browser"
-    verb.add_argument("--out", type=Path, metavar="FILE.html", help=text)
+    verb.add_argument("--out", type=output_file, metavar="FILE.html", help=text)
     verb.add_argument("--no-browser", action="store_true", help="print the address alone")
 
 

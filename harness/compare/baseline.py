@@ -31,7 +31,8 @@ from harness.core.files import (
     write_text,
 )
 from harness.core.interrupts import defer_interrupts
-from harness.errors import BadInput, shorten
+from harness.core.output_place import place_fault
+from harness.errors import BadFile, BadInput, shorten
 from harness.results import BASELINE_FILES, COUNT_METRICS, SCHEMA, ResultSet, load_results
 from harness.results.files import (
     BASELINES,
@@ -70,6 +71,8 @@ def write_baseline(run: Path, name: str, folder: Path = BASELINES, force: bool =
         raise BadInput(f"{run} has no cells.", "A baseline needs at least one.")
     if target.exists() and not force:
         raise BadInput(f"Baseline {name} exists ({target}).", "Choose another name, or replace it with --force.")
+    if fault := place_fault(folder):
+        raise BadFile(target, fault, "a folder to write", "Work in another folder.")
     remove_leftovers(target)
     temporary = temporary_path(target)
     shutil.rmtree(temporary, ignore_errors=True)

@@ -46,5 +46,8 @@ def test_files_that_hold_no_clip_are_refused(tmp_path: Path) -> None:
         read_clip(tmp_path / "91_01.c3d")
     with pytest.raises(BadInput, match="skeleton without motion"):
         read_clip(tmp_path / "91.asf")
+    with pytest.raises(BadFile, match="no such file; expected a motion file"):
+        read_clip(tmp_path / "91_01.fbx")
+    (tmp_path / "91_01.fbx").write_text("; FBX 7.4.0 project file")
     with pytest.raises(BadFile, match=r"suffix '\.fbx'"):
         read_clip(tmp_path / "91_01.fbx")

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         player_script,
     )
     from harness.report.kit.page import Page
-    from harness.report.kit.page_html import render_html, write_page
+    from harness.report.kit.page_html import check_page_place, render_html, write_page
     from harness.report.kit.page_text import render_text
     from harness.report.kit.render_process import RenderJob, RenderProcess, finish_renderer, start_renderer
     from harness.report.kit.statement_lines import MARKS, format_statements
@@ -44,6 +44,7 @@ __all__ = [
     "RenderJob",
     "RenderProcess",
     "bone_radii_mm",
+    "check_page_place",
     "describe_body",
     "draw_chart",
     "finish_renderer",

@@ -11,6 +11,8 @@ from harness.report.kit.inline_svg import inline_svg
 from harness.report.kit.markup import Markup, join, scroll_box, tag
 from harness.report.kit.style import Chart
 
+PAGE_BEGIN = b'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy"'
+"""First bytes of a page, by which one is told from another file."""
 _CONTENT_SECURITY_POLICY = (
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
     "base-uri 'none'; form-action 'none'"

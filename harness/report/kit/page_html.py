@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.files import write_text
+from harness.core.input_file import MEGABYTE, open_input_file
 from harness.core.number_format import NOT_MEASURED, Interval
-from harness.report.kit.document import chart_figure, chart_panel, html_document
+from harness.errors import BadFile
+from harness.report.kit.document import PAGE_BEGIN, chart_figure, chart_panel, html_document
 from harness.report.kit.markup import Markup, bullet_list, details, inline_code, join, scroll_box, tag, verdict_badge
 from harness.report.kit.page import (
     Badge,
@@ -37,6 +39,16 @@ last number."""
 _SPREAD = re.compile(r"((?<=\S) ± [\d.,]+)?( n\u00a0[\d, of]+)?$")
 """End of a text that is set in small type: a standard deviation, and the number of clips behind a mean."""
 _NOT_MEASURED = tag("span", NOT_MEASURED, class_="none")
+
+
+def check_page_place(path: Path) -> None:
+    """BadFile where a file has this name that is no page of the harness: a page may be replaced, and nothing else."""
+    if not path.exists():
+        return
+    with open_input_file(path, "a page to write", 64 * MEGABYTE, "Choose another.") as file:
+        begin = file.read(len(PAGE_BEGIN))
+    if begin != PAGE_BEGIN:
+        raise BadFile(path, "it exists, and is no page of the harness", "a new file", "Choose another name.")
 
 
 def write_page(page: Page, path: Path, plots: Path | None = None) -> Path:

@@ -36,6 +36,7 @@ from harness.core.fields import build
 from harness.core.file_kind import wrong_file
 from harness.core.input_file import MEGABYTE, open_input_file, read_input_file
 from harness.core.interrupts import defer_interrupts
+from harness.core.output_place import place_fault
 from harness.core.parsing import parse_json
 from harness.errors import BadFile, HarnessError, SystemFault, shorten, was_interrupted
 from harness.stream.is900.codec.reader import ByteCapture, WireFormat
@@ -417,7 +418,9 @@ class RecordingWriter:
                 kept = [*islice(blocks, 1), *(block for block in blocks if block.kind in (CONFIGURED, NOTE))]
             self._check_plan(_note_values(parser, kept, PLAN_FILE))
             return [parser.format_of(block) for block in kept if block.kind == CONFIGURED]
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
+            if fault := place_fault(self.path.parent):
+                raise BadFile(self.path, fault, _WRITABLE_FILE, "Choose another.") from None
             if not self.path.parent.is_dir():
                 raise BadFile(self.path, "no such folder", _WRITABLE_FILE, "Make the folder first.") from None
             return None

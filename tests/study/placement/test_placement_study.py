@@ -357,7 +357,7 @@ def test_studies_that_do_not_exist_are_refused(tmp_path: Path) -> None:
         load_placement_study("placement_walking")
     with pytest.raises(BadFile, match="no such file"):
         load_placement_study(tmp_path / "none.toml")
-    with pytest.raises(BadFile, match="a scenario; expected a placement study. `harness run` runs it"):
+    with pytest.raises(BadFile, match="a scenario; expected a placement study"):
         load_placement_study("scenarios/demo.toml")
 
 
