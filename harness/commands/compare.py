@@ -5,7 +5,7 @@ import argparse
 from harness.commands.flags import Verbs, add_verb, output_file, split_list
 from harness.commands.output import print_result, record_content, this_words
 from harness.core.progress import show_steps
-from harness.errors import BadInput, Outcome
+from harness.errors import Outcome
 
 _SIDE_HELP = "the folder of a run, sweep or baseline, or the name of a baseline"
 _EVERYTHING = "everything"
@@ -34,8 +34,6 @@ def run_compare(args: argparse.Namespace) -> Outcome:
     methods = split_list(args.methods)
     if args.html:
         check_page_place(args.html)
-    if len(args.sides) == 1 and not methods:
-        raise BadInput(f"{args.sides[0]} alone.", "Name two results, or two methods of one with --methods a,b.")
     found = compare_sides(
         name_sides(args.sides, shorten=len(args.sides) > 2),
         reference=args.reference,

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from harness.core.number_format import format_fixed
+from harness.core.number_format import format_fixed, format_share
 from harness.core.text_table import Table
 from harness.live import LiveResult
 
@@ -41,7 +41,7 @@ def lines(result: LiveResult, jitter: Mapping[str, Any]) -> list[str]:
     )
     counts = f"{result.poses} poses in {result.seconds:.1f} s ({states}); {result.dropped} frames dropped"
     share = stages.missed / result.poses if result.poses else 0.0
-    late = f"{stages.missed} poses ({share:.2%}) after their deadline, {1e3 * stages.deadline_s:.2f} ms"
+    late = f"{stages.missed} poses ({format_share(share, 2)}) after their deadline, {1e3 * stages.deadline_s:.2f} ms"
     failed = [f"{name}: {why}" for name, why in result.failed.items()]
     table = Table(["milliseconds", "p50", "p99", "max"], rows)
     return [*table.lines(), "", counts, late, *failed]

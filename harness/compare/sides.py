@@ -48,6 +48,8 @@ def compare_sides(
     chosen = [*methods] * count if len(methods) == 1 else methods or [""] * count
     named = list(zip(loaded * (count if len(sides) == 1 else 1), chosen, strict=True))
     several = len(set(chosen)) > 1
+    if len(sides) == 1 and not several:
+        raise BadInput(f"{sides[0][0]} alone.", "Name another result, or two of its methods with --methods a,b.")
     names = [_side_name(name, method if several else "", len(sides) == 1) for (name, _), method in named]
     if count > 2:
         check_side_names(names)

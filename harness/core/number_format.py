@@ -138,8 +138,12 @@ class Interval:
 
     @property
     def has_interval(self) -> bool:
-        """Whether the ends are known and differ."""
-        return self.is_measured and self.low < self.high
+        """Whether the ends are known and differ by more than rounding."""
+        return self.is_measured and self.low < self.high and not self._is_exact
+
+    @property
+    def _is_exact(self) -> bool:
+        return math.isclose(self.low, self.high, rel_tol=1e-12)
 
     def contains(self, value: float) -> bool:
         """Whether the interval contains a value."""
@@ -176,11 +180,12 @@ class Interval:
         """
         if not self.is_measured or math.isnan(self.low):
             return ""
-        if self.low == self.high and not self.signed:
+        if self._is_exact and not self.signed:
             return "exact"
         low, high = self._write(self.low), self._write(self.high)
-        if low == high and not math.isclose(self.low, self.high, rel_tol=1e-12):  # it has no visible width
-            return f"± {0.5 * (self.high - self.low):.1g}"
+        if low == high and not self._is_exact:  # it has no visible width
+            half = 0.5 * (self.high - self.low)
+            return f"± {format_fixed(half, decimals_for(half, most=12))}"
         return f"{low} to {high}"
 
     def __str__(self) -> str:
@@ -200,7 +205,7 @@ class Interval:
         """
         half = 0.5 * (self.high - self.low)
         if not (self.has_interval and math.isfinite(half)):
-            text = f"{self.value:.{4 if self.low == self.high else 3}g}"
+            text = f"{self.value:.{4 if self._is_exact else 3}g}"
             digits, _, exponent = text.partition("e")
             return max(len(digits.partition(".")[2]) - int(exponent or 0), 0)
         most = decimals_for(self.value or half, digits=_MOST_DIGITS, most=_MOST_DECIMALS)

@@ -76,7 +76,9 @@ def test_exit_codes_and_words(words: str, code: int, word: str, said: str, here:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("main", "--methods a,b"),
+        ("main", "main alone. Name another result, or two of its methods with --methods a,b."),
+        ("main --methods ik", "main alone."),
+        ("main --methods ik,ik", "main alone."),
         ("main nowhere", "no folder or baseline called 'nowhere'"),
         ("main no/where", "no such folder"),
         ("main again --metrics joint_angel_mean_deg", "Did you mean 'joint_angle_mean_deg'"),

@@ -1,7 +1,9 @@
 """Formats of numbers: decimals by unit, a true minus sign, no negative zero."""
 
 import math
+import re
 
+import numpy as np
 import pytest
 
 from harness.core.number_format import (
@@ -78,9 +80,10 @@ def test_decimals_show_the_smallest_value(values: tuple[float | None, ...], digi
         (Interval(150.3, 100.0, 200.6), "150 (100 to 201)"),
         (Interval(0.3, -0.0001, 0.6, signed=True, unit="deg"), "+0.3 deg (0.0 to +0.6)"),
         (Interval(0.0, 0.0, 5e-3, unit="%"), "0 % (0.000 to 0.005)"),
-        (Interval(39.9992, 39.999199, 39.999201), "39.9992 (± 1e-06)"),
+        (Interval(39.9992, 39.999199, 39.999201), "39.9992 (± 0.000001)"),
         (Interval(-12345.0, -12345.0003, -12344.9997, unit="ms"), "−12,345 ms (± 0.0003)"),
-        (Interval(-0.1, -0.1, -0.1 + 1e-16, signed=True), "−0.1 (−0.1 to −0.1)"),  # a width of rounding alone
+        (Interval(-0.1, -0.1, -0.1 + 1e-16, signed=True), "−0.1"),  # a width of rounding alone
+        (Interval(-12345.0, -12345.0 - 1e-9, -12345.0 + 1e-9, unit="ms"), "−12,345 ms"),
         (Interval(-1.0, -2.0, math.inf), "−1 (−2 to ∞)"),
         (Interval(2.0, 2.0, 2.0, unit="mm"), "2 mm"),
         (Interval(1.23456), "1.23"),
@@ -112,3 +115,14 @@ def test_an_interval_contains_its_estimate() -> None:
         Interval(1.0, 2.0, 3.0)
     with pytest.raises(BadInput, match="must contain"):
         Interval(math.nan)
+
+
+def test_no_interval_has_ends_that_read_alike_or_a_negative_zero(rng: np.random.Generator) -> None:
+    for _ in range(2000):
+        value = float(rng.choice([-1.0, 0.0, 1.0]) * 10.0 ** rng.uniform(-8.0, 8.0))
+        below, above = (float(each) for each in rng.choice([0.0, 1.0], 2) * 10.0 ** rng.uniform(-12.0, 8.0, 2))
+        text = str(Interval(value, value - below, value + above, unit="ms", signed=bool(rng.integers(2))))
+        ends = re.search(r"\((.+) to (.+)\)", text)
+        assert ends is None or ends[1] != ends[2], text
+        assert not re.search(r"[−+]0(\.0*)?(?![\d.])", text), text
+        assert "± 0)" not in text, text

@@ -5,7 +5,15 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_fixed, format_p_value, format_share
+from harness.core.number_format import (
+    NOT_MEASURED,
+    Interval,
+    count_noun,
+    format_fixed,
+    format_number,
+    format_p_value,
+    format_share,
+)
 from harness.errors import Outcome
 from harness.report.kit.page import (
     Badge,
@@ -38,6 +46,7 @@ from harness.results.findings import (
     StreamHealth,
     TrustFindings,
 )
+from harness.score import DEFINITIONS
 
 OUTCOME_TITLES: Mapping[Outcome, str] = {
     Outcome.PASS: "Pass",
@@ -187,8 +196,8 @@ def _equivalence_table(found: TrustFindings) -> DataTable:
             one.arm,
             metric_title(one.metric),
             Badge(one.verdict, _EQUIVALENCE_MARKS[one.verdict]),
-            _mean(one.device),
-            _mean(one.simulated),
+            _mean(one.device, one.metric),
+            _mean(one.simulated, one.metric),
             Interval.of(one.difference, one.low, one.high, signed=True),
             f"{one.margin:g}",
             one.clips,
@@ -203,8 +212,8 @@ def _equivalence_table(found: TrustFindings) -> DataTable:
     return DataTable(head, rows, caption=caption, label="equivalence")
 
 
-def _mean(value: float | None) -> str:
-    return NOT_MEASURED if value is None else f"{value:.4g}"
+def _mean(value: float | None, metric: str) -> str:
+    return format_number(value, DEFINITIONS[metric].unit if metric in DEFINITIONS else "")
 
 
 def _distances_table(found: TrustFindings) -> DataTable:
@@ -242,7 +251,7 @@ def _distance_meaning(one: ErrorDistance, level: float) -> str:
 
 
 def _distance(value: float | None, factor: float) -> str:
-    return NOT_MEASURED if value is None else f"{factor * value:.3g}".replace("-", "−")
+    return NOT_MEASURED if value is None else Interval(factor * value).number
 
 
 def _health_table(found: TrustFindings) -> DataTable:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from harness.compare import GATED_METRICS, ClipValues, Sampling, count_clips, count_units, rank_methods, split_by_lag
-from harness.core.number_format import format_number
+from harness.core.number_format import format_number, format_p_value
 from harness.report.kit.ranking import LAG_NOTE, describe_ranking, name_lag
 from harness.report.kit.text import last_line, list_first
 from harness.report.sweep.data import SweepData, VariedKey, unit_of
@@ -56,7 +56,8 @@ def interaction_sentence(interaction: Interaction) -> str:
         f"{effects[at]} at {by.labels[at]}, a difference of differences of {contrast.difference}"
     )
     if contrast.is_told:
-        return f"{_dependence(interaction)}: {more} (p {contrast.p:.2g}, corrected; {count_units(interaction.units)})."
+        p, units = format_p_value(contrast.p), count_units(interaction.units)
+        return f"{_dependence(interaction)}: {more} (p {p}, corrected; {units})."
     if all(each.verdict == "same" for each in interaction.contrasts.values()):
         return f"The effect of {key.name} is the same at every {by.name}, within the margin: {more}."
     return f"Whether the effect of {key.name} depends on {by.name} cannot be told ({contrast.why}): {more}."

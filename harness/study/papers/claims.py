@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from harness.compare import MIN_UNITS, SIGNIFICANCE, compare_paired, count_needed, holm, margin_of, sign_flip_p
+from harness.core.number_format import format_change_percent, format_p_value
 from harness.results import PRIMARY_METRIC
 from harness.results.findings import BenchmarkStatement, Reading, StatementKind, Verdict
 
@@ -178,7 +179,7 @@ def _with_correction(claim: BenchmarkStatement, p: float, statements: int) -> Be
         f"too few units: {claim.clips}, and among {statements} printed statements a difference needs "
         f"{count_needed(statements)}"
         if few
-        else f"not significant among {statements} printed statements: p = {p:.2g} after Holm"
+        else f"not significant among {statements} printed statements: p {format_p_value(p)} after Holm"
     )
     return replace(claim, verdict="cannot tell", why="; ".join(filter(None, (reason, claim.why))))
 
@@ -217,6 +218,7 @@ def claim_published_value(
     if not comparable:
         return replace(claim, verdict="not comparable")
     off = mean / published - 1.0
+    change = format_change_percent(100.0 * off)
     if abs(off) <= TOLERANCE:
-        return replace(claim, verdict="reproduced", why=f"{off:+.0%}, within {TOLERANCE:.0%}")
-    return replace(claim, verdict="not reproduced", why=f"{off:+.0%}, beyond {TOLERANCE:.0%}; {why}".removesuffix("; "))
+        return replace(claim, verdict="reproduced", why=f"{change}, within {TOLERANCE:.0%}")
+    return replace(claim, verdict="not reproduced", why=f"{change}, beyond {TOLERANCE:.0%}; {why}".removesuffix("; "))

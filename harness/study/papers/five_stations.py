@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 
 from harness.compare import compare_paired
+from harness.core.number_format import Interval
 from harness.results import PRIMARY_METRIC
 from harness.results.findings import BenchmarkStatement, FindingsTable, PaperExperiment, Reading, StatementKind
 from harness.study.papers.claims import Errors, claim_lower_error
@@ -141,6 +142,5 @@ def _gains(behaviour: str, rows: Sequence[SummaryRow]) -> Iterator[tuple[str, ..
         errors = errors_by_method(selected)
         for other in METHODS[1:]:
             gain = compare_paired(errors.get(other, {}), errors.get(KERNEL_CCA, {}))
-            mean = "not measured" if gain.mean is None else f"{gain.mean:+.2f}"
-            ends = "" if gain.low is None else f"{gain.low:+.2f} to {gain.high:+.2f}"
-            yield behaviour, performer, calibration, other, mean, ends, str(len(gain.units))
+            found = Interval.of(gain.mean, gain.low, gain.high, signed=True)
+            yield behaviour, performer, calibration, other, found.number, found.ends, str(len(gain.units))

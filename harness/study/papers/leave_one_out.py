@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from harness.core.number_format import format_fixed
 from harness.results.findings import BenchmarkStatement, FindingsTable, PaperExperiment, Reading, StatementKind
 from harness.study.papers.claims import claim_lower_error
 from harness.study.papers.paper_study import PaperStudy
@@ -209,7 +210,7 @@ def _performer_tables(
             gains = [each[order.higher][unit] - each[order.lower][unit] for unit in units]
             if gains:
                 agree = f"{sum(gain > 0.0 for gain in gains)} of {len(gains)}"
-                shown = f"{math.fsum(gains) / len(gains):+.2f}"
+                shown = format_fixed(math.fsum(gains) / len(gains), 2, signed=True)
                 rows.append((str(condition), f"{order.lower} < {order.higher}", agree, shown))
     if rows:
         columns = ("condition", "order", "performers who agree", "mean gain over performers [deg]")

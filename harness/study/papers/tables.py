@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.compare.run_summary import GROUP_KEYS
 from harness.core.arrays import Floats
-from harness.core.number_format import count_noun
+from harness.core.number_format import count_noun, format_fixed, format_mean_sd
 from harness.errors import BadInput
 from harness.results import PRIMARY_METRIC, Cell
 from harness.results.findings import BarChart, FindingsTable, LineChart
@@ -81,9 +81,8 @@ def format_mean(errors: Mapping[str, float], decimals: int = 2) -> str:
     rms = errors.rms if isinstance(errors, UnitErrors) else None
     if mean is None:
         return "not measured"
-    spread = "" if sd is None else f" ± {sd:.{decimals}f}"
-    root = f", RMS {mean_sd(rms)[0]:.{decimals}f}" if rms else ""
-    return f"{mean:.{decimals}f}{spread}{root} ({len(errors)})"
+    root = f", RMS {format_fixed(mean_sd(rms)[0], decimals)}" if rms else ""
+    return f"{format_mean_sd(mean, sd, decimals)}{root} ({len(errors)})"
 
 
 ErrorGroups = Mapping[str, Mapping[str, Mapping[str, float]]]
