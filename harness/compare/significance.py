@@ -18,6 +18,7 @@ import numpy as np
 
 from harness.compare.paired_statistics import MIN_UNITS, mean_interval, round_to_grid
 from harness.core.arrays import Floats
+from harness.core.number_format import count_noun
 from harness.core.seeds import generator
 
 Verdict = Literal["better", "same", "worse", "cannot tell"]
@@ -87,7 +88,7 @@ def _verdict(line: Floats, low: float, high: float, p: float, margin: float, lin
     if lines * smallest_possible_p(line) > SIGNIFICANCE:
         return "cannot tell", _describe_too_few(line, lines)
     if p > SIGNIFICANCE and excludes_zero:
-        return "cannot tell", f"the difference is not significant among {lines} lines"
+        return "cannot tell", f"the difference is not significant among {count_noun(lines, 'line')}"
     if excludes_zero:
         return "cannot tell", "the sides differ, perhaps by more than the margin"
     return "cannot tell", "the interval contains zero and exceeds the margin"

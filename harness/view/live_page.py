@@ -18,7 +18,11 @@ STATUS_COLOURS = {"OK": "#00795c", "HELD": "#f2c200", "LOST": "#c8321e"}
 STATION_COLOURS = ("#248bf2", "#8c4d82", "#6262b2", "#b28695", "#8b24f2", "#978fbf")
 """Colours of the stations, in turn. No two of them or of a status are alike, also for colour-blind readers. Their
 contrast is about 3 or more to a light and to a dark page."""
-_CALIBRATIONS = {"tpose": "Calibrate: T-pose", "poses": "Calibrate: eight poses"}
+_CALIBRATIONS = {
+    "tpose": ("Calibrate: T-pose", "mounts and room; this session uses them"),
+    "poses": ("Calibrate: eight poses", "bones, mounts and room; the next session uses them, by --calibration"),
+}
+"""Kind of a calibration -> text and explanation of its button."""
 
 
 class LiveContent:
@@ -61,9 +65,10 @@ def _page(title: str, stations: Sequence[str], calibrations: Sequence[str]) -> b
             ("latency", "Latency p50, p99 (dashed):"),
         )
     ]
+    offered = {kind: _CALIBRATIONS[kind] for kind in calibrations}
     buttons = [
         tag("button", "Reset heading", id_="heading", type_="button", title="key H"),
-        *(tag("button", _CALIBRATIONS[kind], type_="button", data_kind=kind) for kind in calibrations),
+        *(tag("button", text, type_="button", data_kind=kind, title=title) for kind, (text, title) in offered.items()),
         tag("button", "Record", id_="record", type_="button", title="key R"),
     ]
     reader = "You can look and not command. Commands need the address that the terminal of the session shows."

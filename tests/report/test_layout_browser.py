@@ -153,11 +153,13 @@ def test_a_page_is_small_and_its_first_screen_has_verdict_and_picture(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_no_text_is_smaller_than_11_pixels_on_a_narrow_screen(browser: Any, pages: dict[str, Path], kind: str) -> None:
+def test_no_text_is_smaller_than_11_pixels(browser: Any, pages: dict[str, Path], kind: str) -> None:
     page = browser.new_page(viewport={"width": 700, "height": SCREEN_PX})
     page.goto(pages[kind].as_uri())
     page.evaluate(UNFOLD)
-    sizes = page.evaluate(TEXT_SIZES)
-    assert len(sizes) > 30
-    assert [(size, text) for size, text in sizes if size < SMALLEST_PX] == []
+    for width in (700, 900, 1000, 1150, 1250, 1400):
+        page.set_viewport_size({"width": width, "height": SCREEN_PX})
+        sizes = page.evaluate(TEXT_SIZES)
+        assert len(sizes) > 30
+        assert [(width, size, text) for size, text in sizes if size < SMALLEST_PX] == []
     page.close()

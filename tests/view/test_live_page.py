@@ -100,6 +100,15 @@ def wait_for_text(tab: Any, selector: str, text: str) -> None:
     tab.wait_for_function(f"() => document.querySelector('{selector}').textContent.startsWith({json.dumps(text)})")
 
 
+AXIS_OFFSETS = """() => [...document.querySelectorAll(".time")].map((axis) => {
+  const plots = axis.previousElementSibling.parentElement.querySelectorAll(".plot svg");
+  const left = plots[0].getBoundingClientRect().left, words = document.createRange();
+  words.selectNodeContents(axis.firstChild);
+  return words.getBoundingClientRect().left - left;
+})"""
+"""How far each time axis begins to the right of its chart [px]."""
+
+
 def test_the_page_follows_the_session(tab: Any, server: ViewServer) -> None:
     assert tab.inner_text("h1") == "a <session>"
     assert tab.locator("#session").all_inner_texts()[0].split("\n") == ["LOST", "no pose yet"]
@@ -119,6 +128,10 @@ def test_the_page_follows_the_session(tab: Any, server: ViewServer) -> None:
     assert [axis.split() for axis in tab.locator(".time").all_inner_texts()] == [
         ["60", "s", "ago", "30", "s", "now"]
     ] * 4
+    for width in (700, 1400, 330):
+        tab.set_viewport_size({"width": width, "height": 900})
+        assert tab.evaluate(AXIS_OFFSETS) == pytest.approx([0.0] * 4, abs=1.5), "a time axis begins below its chart"
+    tab.set_viewport_size({"width": 700, "height": 900})
     assert tab.locator("#stations .line").count() == 2, "each station has a chart of its own"
     assert tab.locator(".names span").all_inner_texts() == ["head"], "the station that is lost is not drawn"
     assert tab.evaluate("document.documentElement.scrollWidth") <= 700

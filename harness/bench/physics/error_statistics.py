@@ -8,6 +8,7 @@ import numpy as np
 from harness.bench.physics.speed import MOUNTS, PHYSICAL
 from harness.body import retarget_to_own_body
 from harness.core.arrays import Floats, Ints
+from harness.core.number_format import count_noun
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
 from harness.measure import Episodes, ErrorSpectrum, find_excursions, find_gaps, measure_spectrum, pool_spectra
@@ -120,9 +121,8 @@ def compare_error_models(
     """Statistics of both error models on built-in boxing, one take of each seed, with six stations."""
     out = []
     models = {"physics": PHYSICAL, 'noise = "default"': noise_preset("default")}
-    source = (
-        f"{len(seeds)} takes of built-in boxing of {_SECONDS:.0f} s, {_STATIONS} stations at {_TRACKER.rate_hz:g} Hz"
-    )
+    takes = f"{count_noun(len(seeds), 'take')} of built-in boxing of {_SECONDS:.0f} s"
+    source = f"{takes}, {_STATIONS} stations at {_TRACKER.rate_hz:g} Hz"
     for done, (label, noise) in enumerate(models.items()):
         progress(f"errors of {label}", done, len(models))
         out.append(error_statistics(label, f"{source}.", _recordings(seeds, noise)))

@@ -12,17 +12,18 @@ from harness.report.comparison.wording import (
     KINDS,
     MARKS,
     MEANINGS,
-    OUTCOME_TITLES,
     clips_of,
     comparison_sentence,
     count_verdicts,
     deciding_parts,
     excerpt_pair,
+    format_margin,
     format_mean,
     format_signed,
     groups_vary,
     line_interval,
     listed_issues,
+    outcome_title,
     parts_of,
     percent_of_a,
     sort_by_verdict,
@@ -98,7 +99,7 @@ def comparison_page(comparison: Comparison) -> Page:
     return Page(
         verb="compare",
         name=f"{comparison.b} against {comparison.a}",
-        verdict=(OUTCOME_TITLES[comparison.outcome], comparison.outcome),
+        verdict=(outcome_title(comparison.outcome, [comparison]), comparison.outcome),
         headline=comparison_sentence(comparison),
         lead=[
             TerminalOnly([Bullets(_cut(parts, _MOST_PRINTED, "{} more lines: --html"), prefix="")]),
@@ -191,7 +192,7 @@ def lines_table(comparison: Comparison, lines: Sequence[Difference], label: str,
             format_change_percent(percent_of_a(line, line.difference)),
             format_p_value(line.p),
             format_p_value(line.p_holm),
-            format_mean(line, line.margin),
+            format_margin(line),
             len(line.units),
         ]
         for line in lines
@@ -264,7 +265,7 @@ def _margins_table(lines: Sequence[Difference]) -> DataTable:
     for metric in dict.fromkeys(line.metric for line in lines):
         same = [line for line in lines if line.metric == metric]
         ends = [pick(same, key=lambda line: line.margin) for pick in (min, max)]
-        absolute = " to ".join(dict.fromkeys(format_mean(line, line.margin) for line in ends))
+        absolute = " to ".join(dict.fromkeys(format_margin(line) for line in ends))
         shares = (format_change_percent(percent_of_a(line, line.margin)).lstrip("+") for line in ends)
         rows.append([metric, f"{absolute} {same[0].unit}", " to ".join(dict.fromkeys(shares))])
     caption = "Margins: the smallest change that matters in practice, a share of A's mean but not less than a floor."

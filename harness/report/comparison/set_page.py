@@ -11,11 +11,11 @@ from harness.report.comparison.page import verdict_notes
 from harness.report.comparison.wording import (
     MARKS,
     MEANINGS,
-    OUTCOME_TITLES,
     count_verdicts,
     format_mean,
     line_interval,
     listed_issues,
+    outcome_title,
     percent_of_a,
 )
 from harness.report.kit.page import (
@@ -70,7 +70,7 @@ def set_page(comparisons: ComparisonSet) -> Page:
     return Page(
         verb="compare",
         name=f"{list_first(names)} against {comparisons.reference}",
-        verdict=(OUTCOME_TITLES[comparisons.outcome], comparisons.outcome),
+        verdict=(outcome_title(comparisons.outcome, every), comparisons.outcome),
         headline=_headline(comparisons),
         lead=[Tally(count_verdicts(gated), MARKS, MEANINGS)] if gated else [],
         facts={
@@ -160,7 +160,7 @@ def _charts(comparisons: ComparisonSet) -> list[Block]:
 
 
 def _outcomes(every: Sequence[Comparison]) -> DataTable:
-    rows = [[each.b, OUTCOME_TITLES[each.outcome], f"{each.matched:,}", each.why] for each in every]
+    rows = [[each.b, outcome_title(each.outcome, [each]), f"{each.matched:,}", each.why] for each in every]
     return DataTable(["result", "outcome", "cells matched", "reason"], rows, label="outcome of each result")
 
 

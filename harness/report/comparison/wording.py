@@ -2,10 +2,10 @@
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import get_args
 
-from harness.compare import MARGINS, Comparison, Difference, Verdict, count_units
+from harness.compare import MARGINS, MIN_UNITS, Comparison, Difference, Verdict, count_units
 from harness.core.number_format import Interval, count_noun, decimals_for, format_change_percent, format_fixed
 from harness.errors import Outcome
 from harness.report.kit.text import list_first
@@ -27,6 +27,20 @@ OUTCOME_TITLES: Mapping[Outcome, str] = {
     Outcome.NOT_COMPARABLE: "Not comparable",
     Outcome.INCOMPLETE: "Incomplete",
 }
+
+
+def outcome_title(outcome: Outcome, comparisons: Iterable[Comparison]) -> str:
+    """The word for an outcome. Where everything can be compared and lines are undecided it is "Cannot tell"."""
+    undecided = [each for each in comparisons if each.outcome is outcome is Outcome.NOT_COMPARABLE]
+    if undecided and all(_is_comparable(each) for each in undecided):
+        return "Cannot tell"
+    return OUTCOME_TITLES[outcome]
+
+
+def _is_comparable(each: Comparison) -> bool:
+    """Whether gated lines were measured, and nothing in the inputs, cells and coverage differs."""
+    differs = each.inputs_that_differ or each.only_a or each.only_b or each.coverage
+    return not differs and any(line.gated for line in each.differences)
 
 
 def comparison_sentence(comparison: Comparison) -> str:
@@ -77,7 +91,9 @@ def _describe_kind(name: str, parts: Sequence[Difference]) -> str:
             return f"the same for {list_first([_part_name(part) for part in parts])}"
         largest = max(parts, key=lambda part: abs(part.difference))
         change = format_change_percent(percent_of_a(largest, largest.difference))
-        return f"no {name} alone shows a difference, the largest is {change} for {_part_name(largest)}"
+        few = all(len(part.units) < MIN_UNITS for part in parts)
+        told = f"has {MIN_UNITS} units, which a verdict needs" if few else "shows a difference"
+        return f"no {name} alone {told}, the largest is {change} for {_part_name(largest)}"
     texts = []
     for verdict in ("worse", "better"):
         names = [_part_name(part) for part in differing if part.verdict == verdict]
@@ -165,6 +181,11 @@ def format_mean(line: Difference, value: float) -> str:
 def format_signed(line: Difference, value: float | None) -> str:
     """A difference with its sign and the decimals of the line; a dash for None."""
     return "–" if value is None else format_fixed(value, _decimals(line), signed=True, grouped=True)
+
+
+def format_margin(line: Difference) -> str:
+    """The margin with the decimals of the line, or more where it would seem to be zero."""
+    return format_fixed(line.margin, max(_decimals(line), decimals_for(line.margin, most=6)), grouped=True)
 
 
 def line_interval(line: Difference) -> Interval:

@@ -226,7 +226,7 @@ const MotionPlayer = (() => {
         const count = this.worn.names.length, row = (values, frame) => values.subarray(count * frame, count * (frame + 1));
         const present = frames.map((frame) => (100 * row(this.worn.states, frame).filter((state) => state < 2).length) / count);
         signals.push(["lowest quality [%]", 100, [[STATION[1], frames.map((frame) => Math.min(...row(this.worn.quality, frame)))]]]);
-        signals.push(["stations with readings [%]", 100, [[STATION[0], present]]]);
+        signals.push(["stations read [%]", 100, [[STATION[0], present]]]);
       }
       this.signals.replaceChildren(...signals.map(([text, most, lines]) => {
         const box = make("div", { className: "signal", onclick: (event) => this.seek(Math.round((last * event.offsetX) / box.clientWidth)) });

@@ -50,7 +50,7 @@ from harness.score import DEFINITIONS
 
 OUTCOME_TITLES: Mapping[Outcome, str] = {
     Outcome.PASS: "Pass",
-    Outcome.REGRESSED: "Contradicted",
+    Outcome.REGRESSED: "Differs",
     Outcome.NOT_COMPARABLE: "Cannot tell",
     Outcome.INCOMPLETE: "Incomplete",
 }
@@ -83,7 +83,7 @@ def trust_page(found: TrustFindings, command: str) -> Page:
             *([Tally(count_pairs(found.pairs), _PAIR_MARKS, _PAIR_MEANINGS)] if found.pairs else []),
         ],
         facts={
-            "Methods": list_first(found.arms, 8),
+            "Methods": list_first(found.arms, 8, "; "),
             "Motion": f"{count_noun(len(names), 'clip')}: {list_first(names, 4)}" if names else "none",
             "Captures": f"{len(found.captures):,}",
             "Simulated with": simulated,
@@ -135,15 +135,15 @@ def _what_differs(findings: TrustFindings) -> str:
     """Pairs that contradict, and metrics beyond their margin."""
     pairs = [pair_title(pair) for pair in findings.pairs if pair.verdict == "contradict"]
     beyond = [
-        f"{one.arm} {metric_name(one.metric)}" for one in findings.equivalences if one.verdict == "beyond the margin"
+        f"{metric_name(one.metric)} of {one.arm}" for one in findings.equivalences if one.verdict == "beyond the margin"
     ]
     parts = []
     if pairs:
         of = f"{len(pairs)} of {count_noun(len(findings.pairs), 'pair')} of methods"
-        parts.append(f"contradicts the device in {of} ({list_first(pairs)})")
+        parts.append(f"contradicts the device in {of} ({list_first(pairs, separator='; ')})")
     if beyond:
         of = f"{len(beyond)} of {count_noun(len(findings.equivalences), 'metric')}"
-        parts.append(f"differs from the device beyond the margin in {of} ({list_first(beyond)})")
+        parts.append(f"differs from the device beyond the margin in {of} ({list_first(beyond, separator='; ')})")
     return " and ".join(parts)
 
 

@@ -134,14 +134,15 @@ def _label_axes(axes: Axes, bars: BarChart, horizontal: bool) -> None:
     middles = np.arange(len(bars.groups))
     letters = _HORIZONTAL_LETTERS if horizontal else _LETTERS // max(len(bars.groups), 1)
     names = [textwrap.fill(group, letters) for group in bars.groups]
+    label = "error [deg]" if bars.unit == "deg" else bars.unit
     if horizontal:
         axes.set_yticks(middles, names)
         axes.set_ylim(len(middles) - 0.45, -0.55)
-        axes.set_xlabel(bars.unit)
+        axes.set_xlabel(label)
         axes.margins(x=0.12)
     else:
         axes.set_xticks(middles, names)
-        axes.set_ylabel(bars.unit)
+        axes.set_ylabel(label)
         axes.margins(y=0.12)
     axes.grid(False, axis="y" if horizontal else "x")
     axes.tick_params(axis="y" if horizontal else "x", length=0)

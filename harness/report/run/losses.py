@@ -115,9 +115,9 @@ def _loss_chart(loss: Decomposition) -> Chart:
     groups = [BodyGroup("share of the difference [%]", "%", False, {loss.method: shares})]
 
     def draw(figure: Figure) -> None:
-        left, right = cast(Any, figure.subfigures(1, 2, width_ratios=(1.0, 2.3)))
+        left, right = cast(Any, figure.subfigures(1, 2, width_ratios=(1.0, 3.2)))
         draw_bodies(left, groups)
-        axes = right.add_axes((0.5, 0.12, 0.47, 0.87))
+        axes = right.add_axes((0.0, 0.12, 0.97, 0.87))
         for row, part in enumerate(rows):
             if part:
                 named = part in (loss.largest(kind) for kind in _KINDS)
@@ -127,6 +127,8 @@ def _loss_chart(loss: Decomposition) -> Chart:
                 )
                 axes.vlines(100.0 * part.even_share, row - 0.35, row + 0.35, color=INK, linewidth=1.2)
         label_rows(axes, [part.name if part else "" for part in rows])
+        start = 0.03 + max(text.get_window_extent().width for text in axes.get_yticklabels()) / right.bbox.width
+        axes.set_position((start, 0.12, 0.97 - start, 0.87))
         axes.axvline(0.0, color=FAINT, linewidth=0.8)
         axes.set_xlabel("share of the difference [%]")
 

@@ -190,7 +190,7 @@ def _format_count(value: Any) -> str:
         return NOT_MEASURED
     if isinstance(value, Mapping):
         return ", ".join(f"{name} {_format_count(item)}" for name, item in value.items())
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def all_metrics_table(run: RunData) -> DataTable:

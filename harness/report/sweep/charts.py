@@ -23,6 +23,8 @@ _WIDTH_IN, _LINES_IN, _ROW_IN, _LETTER_IN = 4.2, 2.7, 0.085, 0.165
 _LETTERS, _MOST_ROWS, _MOST_NAMED, _MOST_LETTERS, _MOST_TICKS = 18, 4, 8, 44, 5
 """Letters of a name next to an axis, and its most rows; most lines with names at their ends; letters of a name in a
 legend; most tick labels of a logarithmic axis."""
+_TICK_GAP = 0.12
+"""Least distance of the values that have tick labels of their own, as a share of the axis."""
 _LOG_SCALE_RATIO = 30.0
 """The axis is logarithmic if the last of its positive values is more than this many times the first."""
 
@@ -163,6 +165,8 @@ def _draw_lines(axes: Axes, key: VariedKey, shown: Curves, names: Sequence[str])
         every = -(-len(key.numbers) // _MOST_TICKS)
         axes.set_xticks(key.numbers[::every], key.labels[::every])
         axes.set_xticks([], minor=True)
+    elif min(np.diff(key.numbers), default=0.0) > _TICK_GAP * (key.numbers[-1] - key.numbers[0]):
+        axes.set_xticks(key.numbers, key.labels)
     axes.set_xlabel(key.name)
     axes.set_ylabel(f"joint angle error [{unit_of(PRIMARY_METRIC)}]")
     axes.set_ylim(bottom=0.0)

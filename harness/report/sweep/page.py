@@ -39,6 +39,7 @@ from harness.report.sweep.data import METRICS, Statistic, SweepData, VariedKey, 
 from harness.report.sweep.effects import Interaction, KeyEffect, key_effects, key_interactions
 from harness.report.sweep.wording import (
     best_sentence,
+    effect_reason,
     group_failures,
     interaction_sentence,
     list_values,
@@ -72,7 +73,7 @@ def sweep_page(sweep: SweepData) -> Page:
     return Page(
         verb="sweep",
         name=sweep.name,
-        headline=sweep_sentence(sweep),
+        headline=sweep_sentence(sweep, reasons=False),
         lead=_result(sweep),
         facts={
             "Scenarios": list_first(sweep.scenarios, 8),
@@ -117,7 +118,10 @@ def _result(sweep: SweepData) -> list[Block]:
                 Prose(interaction_sentence(interaction)),
                 Drawing(draw, _interaction_table(interaction), level=0),
             ]
-        blocks += [_effect_table(effect, kind) for effect in key_effects(sweep, performers)]
+        for effect in key_effects(sweep, performers):
+            reason = effect_reason(effect)
+            blocks.append(_effect_table(effect, kind))
+            blocks += [BrowserOnly([Prose(f"{effect.key.name}: {reason}.")])] if reason else []
     return blocks
 
 

@@ -15,12 +15,15 @@ _MOST_NAMED = 4
 """Most values of a key that a sentence names."""
 
 
-def sweep_sentence(sweep: SweepData) -> str:
-    """The result: which value of each key is best, and which keys interact; without varied keys the best method."""
+def sweep_sentence(sweep: SweepData, *, reasons: bool = True) -> str:
+    """The result: which value of each key is best, and which keys interact; without varied keys the best method.
+
+    The headline of a page leaves out the reasons why values cannot be told apart; `effect_reason` has them.
+    """
     sentences = []
     for performers in dict.fromkeys(sweep.performers):
         effects = key_effects(sweep, performers)
-        of_kind = [*map(effect_sentence, effects)]
+        of_kind = [effect_sentence(effect, reasons=reasons) for effect in effects]
         of_kind += [f"{_dependence(each)}." for each in key_interactions(sweep, performers) if _is_told(each)]
         if of_kind:
             counted = count_units({unit for effect in effects for unit in effect.units})
@@ -28,21 +31,28 @@ def sweep_sentence(sweep: SweepData) -> str:
     return " ".join(sentences) or best_sentence(sweep) or progress_sentence(sweep)
 
 
-def effect_sentence(effect: KeyEffect) -> str:
+def effect_sentence(effect: KeyEffect, *, reasons: bool = True) -> str:
     """Which value of a key is best, by how much, and which values cannot be told apart."""
     name, labels, lowest = effect.key.name, effect.key.labels, effect.key.labels[effect.lowest]
     means = effect.errors.mean(axis=0)
     worse = sorted((n for n, contrast in effect.contrasts.items() if contrast.is_told), key=lambda n: float(means[n]))
     tied = [labels[n] for n in effect.contrasts if n not in worse]
     if not worse:
-        largest = max(effect.contrasts, key=lambda n: effect.contrasts[n].difference.value)
-        why = f"lowest at {lowest}; {labels[largest]}: {effect.contrasts[largest].why}"
-        return f"{name}: {list_first([lowest, *tied], _MOST_NAMED)} cannot be told apart ({why})."
+        why = f" ({effect_reason(effect)})" if reasons else ""
+        return f"{name}: {list_first([lowest, *tied], _MOST_NAMED)} cannot be told apart{why}."
     best = (
         f"{list_first([lowest, *tied], _MOST_NAMED)} are best and cannot be told apart" if tied else f"{lowest} is best"
     )
     at = worse[-1] if tied else worse[0]
     return f"{name}: {best}; {labels[at]} errs {replace(effect.contrasts[at].difference, signed=False)} more."
+
+
+def effect_reason(effect: KeyEffect) -> str:
+    """Why no value of a key is told to be best; "" where one is."""
+    if any(contrast.is_told for contrast in effect.contrasts.values()):
+        return ""
+    labels, largest = effect.key.labels, max(effect.contrasts, key=lambda n: effect.contrasts[n].difference.value)
+    return f"lowest at {labels[effect.lowest]}; {labels[largest]}: {effect.contrasts[largest].why}"
 
 
 def interaction_sentence(interaction: Interaction) -> str:

@@ -92,7 +92,7 @@ def timeline_page(timeline: Timeline, links: Links | None = None) -> Page:
         },
         sections=[
             Section("Changes", "changes", _changes(timeline, links or {})),
-            Section("Over time", "time", [TerminalOnly(drawings[:1]), *drawings[1:]]),
+            Section("Other metrics", "time", [TerminalOnly(drawings[:1]), *drawings[1:]], "over time"),
             Section("Entries", "entries", [BrowserOnly([_entries(timeline)])]),
             Section("How changes are found", "how", [*map(Prose, _HOW)], terminal=False),
         ],

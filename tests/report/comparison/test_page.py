@@ -22,6 +22,8 @@ from harness.report.comparison.wording import (
     comparison_sentence,
     count_directions,
     count_verdicts,
+    describe_parts,
+    format_margin,
     line_interval,
 )
 from harness.report.kit.chart import draw_chart
@@ -58,17 +60,33 @@ def test_the_first_line_is_the_verdict(comparison: Comparison) -> None:
 
 def test_one_sentence_says_what_came_of_it(tmp_path: Path) -> None:
     incomplete = nothing_compared(outcome=Outcome.INCOMPLETE, why="planned cells are missing: A: ik")
-    for shown, said in (
-        (compared({"ik": 0.0, "dynamic_map": -0.06}), "B is no worse than A in 2 gated lines on 24 takes"),
-        (every_verdict(3), "It cannot be decided whether B is worse than A: "),
-        (incomplete, "missing: A: ik."),
-        (nothing_compared(why="no cell of A has a partner in B"), "no cell of A has a partner in B."),
+    for shown, title, said in (
+        (compared({"ik": 0.0, "dynamic_map": -0.06}), "Pass", "B is no worse than A in 2 gated lines on 24 takes"),
+        (every_verdict(3), "Cannot tell", "It cannot be decided whether B is worse than A: "),
+        (replace(every_verdict(3), coverage=("A: ik",)), "Not comparable", "It cannot be decided"),
+        (incomplete, "Incomplete", "missing: A: ik."),
+        (nothing_compared(why="no cell of A has a partner in B"), "Not comparable", "no cell of A has a partner in B."),
     ):
         assert said in comparison_sentence(shown)
         found = text_of(write_comparison_page(shown, tmp_path / "page.html"))
-        assert f"{OUTCOME_TITLES[shown.outcome]} {comparison_sentence(shown)}" in found
+        assert f"{title} {comparison_sentence(shown)}" in found
         assert "nan" not in found.lower().split()
     assert {Outcome.PASS, Outcome.REGRESSED, Outcome.NOT_COMPARABLE, Outcome.INCOMPLETE} == set(OUTCOME_TITLES)
+
+
+def test_a_margin_is_never_zero() -> None:
+    line = one_line(0.05)
+    assert format_margin(replace(line, margin=0.036, low=-8.0, high=14.0)) == "0.04"
+    assert format_margin(replace(line, margin=0.036, low=1.31, high=1.33)) == "0.036"
+    assert format_margin(replace(line, margin=1200.0, low=-8000.0, high=9000.0)) == "1,200"
+
+
+@pytest.mark.parametrize(("units", "told"), [(5, "has 6 units, which a verdict needs"), (6, "shows a difference")])
+def test_parts_with_too_few_units_are_not_said_to_be_alike(units: int, told: str) -> None:
+    found = every_verdict(units)
+    torn = next(line for line in found.differences if line.gated and line.method == "torn")
+    parts = replace(found, differences=(replace(torn, part="golf"),))
+    assert describe_parts(parts, torn).startswith(f"no behaviour alone {told}, the largest is ")
 
 
 def test_every_line_has_its_figures_in_both(page: Path, comparison: Comparison) -> None:

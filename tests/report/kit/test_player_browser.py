@@ -306,7 +306,7 @@ def test_the_standing_body_gives_way_to_the_motion(page: Any) -> None:
 
 def test_signals_lie_under_the_time_line_and_lead_to_their_moment(page: Any) -> None:
     texts = page.locator(".signals span").all_inner_texts()
-    assert [text.partition(" [")[0] for text in texts] == ["error", "lowest quality", "stations with readings"]
+    assert [text.partition(" [")[0] for text in texts] == ["error", "lowest quality", "stations read"]
     assert texts[0] == "error [mm], 0 to 30"
     error, quality, _ = page.locator(".signals path").evaluate_all(
         "(paths) => paths.map((each) => each.getAttribute('d'))"

@@ -10,6 +10,7 @@ from harness.core.number_format import Interval, format_p_value
 from harness.errors import Outcome
 from harness.report.kit.page_html import write_page
 from harness.report.kit.page_text import render_text
+from harness.report.kit.text import metric_name
 from harness.report.lab.trust_page import OUTCOME_TITLES, correlations, count_pairs, trust_page, verdict_sentence
 from harness.results.findings import RankCorrelation, TrustFindings
 from tests.report.reading import count_pictures, emptied, numbers_in_order, read, section_ids, text_of
@@ -48,7 +49,7 @@ def test_the_verdict_is_the_first_thing(page: Path, trust_findings: TrustFinding
         f"{count} {mark} {kind} "
         for mark, (kind, count) in zip("✗?✓", count_pairs(trust_findings.pairs).items(), strict=True)
     ]
-    assert numbers_in_order(text, "Contradicted", verdict_sentence(trust_findings), *counts)
+    assert numbers_in_order(text, "Differs", verdict_sentence(trust_findings), *counts)
     assert f"digest {trust_findings.plan_digest[:12]}" in text
     assert "noise default" in text
     assert "Exploratory" not in text
@@ -66,7 +67,7 @@ def test_each_outcome_has_its_figures(trust_findings: TrustFindings, empty: Trus
     found, turned = trust_findings, contradicted(trust_findings)
     beyond = [row for row in found.equivalences if row.verdict == "beyond the margin"]
     (pair,) = (one for one in turned.pairs if one.verdict == "contradict")
-    margins = f"{len(beyond)} of 6 metrics ({beyond[0].arm} "
+    margins = f"{len(beyond)} of 6 metrics ({metric_name(beyond[0].metric)} of {beyond[0].arm}; "
     for findings, figures in (
         (found, (margins,)),
         (turned, (f"1 of 3 pairs of methods ({pair.a} against {pair.b})", margins)),

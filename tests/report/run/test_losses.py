@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from harness.report.run.data import read_summary_only
-from harness.report.run.losses import decompose_losses, loss_sentence
+from harness.report.run.losses import decompose_losses, loss_blocks, loss_sentence
 from tests.planted import Plan, planted_run
 from tests.products import run_verb
+from tests.report.drawing import drawn_figures
 
 pytestmark = pytest.mark.long
 TWO = {"good": 1.0, "other": 1.0}
@@ -39,6 +40,10 @@ def test_an_error_of_one_elbow_while_it_is_straight_is_named(
     assert re.match(
         r"Why: other loses \d+ % of its \d\.\d\d° to good at the left elbow while the arm is straight", sentence
     )
+    (figure,) = drawn_figures(lambda: loss_blocks([loss])).values()
+    figure.draw_without_rendering()
+    body, bars = figure.subfigs
+    assert all(label.get_window_extent().x0 >= body.bbox.x1 for label in bars.axes[0].get_yticklabels())
     capsys.readouterr()
     run_verb("report", out)
     assert sentence in capsys.readouterr().out

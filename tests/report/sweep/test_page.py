@@ -29,7 +29,13 @@ from harness.report.sweep.charts import (
 from harness.report.sweep.data import READ_METRICS, Statistic, VariedKey, collect_cells, read_sweep
 from harness.report.sweep.effects import key_effects, key_interactions
 from harness.report.sweep.page import scenario_table, sweep_page, sweep_text, write_sweep_page
-from harness.report.sweep.wording import best_sentence, group_failures, interaction_sentence, sweep_sentence
+from harness.report.sweep.wording import (
+    best_sentence,
+    effect_reason,
+    group_failures,
+    interaction_sentence,
+    sweep_sentence,
+)
 from harness.results import PRIMARY_METRIC, CellIndex
 from harness.results.files import compute_digests
 from tests.planted import MeansPlan, planted_sweep
@@ -71,7 +77,11 @@ def test_it_opens_on_its_result_and_says_how_far_it_came(folder: Path) -> None:
     assert re.match(r"tracker\.rate_hz: 120 is best; 20 errs [\d.]+ deg \([\d.]+ to [\d.]+\) more\. noise: ", said)
     assert said.endswith("Compared on 7 performers.")
     raw, text = (folder / "report.html").read_text(encoding="utf-8"), " ".join(sweep_text(sweep).split())
-    assert f"<h1>{said}</h1>" in raw
+    headline, (rate, noise) = sweep_sentence(sweep, reasons=False), map(effect_reason, key_effects(sweep, ""))
+    assert (rate, headline) == ("", said.replace(f" ({noise})", ""))
+    assert len(headline) < len(said)
+    assert f"<h1>{headline}</h1>" in raw
+    assert f"noise: {noise}." in raw
     places = [raw.index(f'id="{name}"') for name in ("varied", "scenarios", "failures", "table")]
     assert places == sorted(places)
     assert text.startswith(f"{said} 168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map is best: ")
