@@ -92,6 +92,25 @@ def test_efforts_rounds_and_runs_share_their_cells(small: Small, tmp_path: Path)
 
 
 @pytest.mark.slow
+def test_questions_of_other_places_share_the_cells_of_equal_sets(small: Small, tmp_path: Path) -> None:
+    """Three pairs of three places on eight performers; then the ten of five places and, all among these, two pairs
+    that are worn on both sides. Of each question the best set is tested on seven others."""
+    small(quick=80)
+    asked = question.PlacementQuestion(2, 2, ("boxing",), ("hand", "pelvis"), ONE_STATION, "clean", effort="quick")
+    asked, tested = replace(asked, second_method="none"), set[tuple[str, ...]]()
+    for changes, sets in (
+        ({}, 3),
+        ({"places": ("hand", "pelvis", "head", "torso")}, 10),
+        ({"places": ("hand", "head", "pelvis", "torso"), "symmetric": True}, 10),
+    ):
+        findings, outcome = run_placement(replace(asked, **changes), tmp_path / "out")
+        assert outcome is Outcome.PASS
+        assert findings.rounds[-1].units == 8
+        tested.add(findings.best[0].stations)
+        assert len(cell_names(tmp_path / "out")) == sets * 8 + 7 * len(tested)
+
+
+@pytest.mark.slow
 def test_a_second_method_that_disagrees_is_the_headline(small: Small, command: Command) -> None:
     """The first method reads nothing, so that it takes any place; the second one needs the pelvis."""
     words = ["placement", "--stations", "1", "--behaviour", "golf", "--places", "head,pelvis", "--noise", "clean"]

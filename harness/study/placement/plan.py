@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from harness.compare import margin_of
+from harness.core.files import content_key
 from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment import check_names
@@ -178,6 +179,7 @@ def plan_study(study: PlacementStudy, load: Callable[[str], Scenario], folder: L
     """Plan a study whose scenarios `load` gives by name; BadInput, UnknownName."""
     scenario = expand_clips(base_scenario(study, load), folder)
     conditions = {c.name: expand_clips(base_scenario(study, load, c), folder) for c in study.condition}
+    conditions = {name: _name_by_places(condition, scenario) for name, condition in conditions.items()}
     source = open_scenario_motion(scenario.motion, folder, scenario.seed)
     held_out = _held_out_scenario(study, scenario, source)
     plan = PlacementPlan(study, study.groups(), scenario, held_out, conditions, source.title, folder)
@@ -192,6 +194,13 @@ def plan_study(study: PlacementStudy, load: Callable[[str], Scenario], folder: L
     for size in {*(len(stations) for stations in plan.known_sets()), *study.sizes}:
         plan.rate_hz(size)
     return plan
+
+
+def _name_by_places(condition: Scenario, own: Scenario) -> Scenario:
+    """A condition with a name of its own where it moves stations: the name of a cell leaves their places out."""
+    if condition.stations == own.stations:
+        return condition
+    return replace(condition, name=f"{condition.name}_{content_key(condition.content()['stations'])[:8]}")
 
 
 def _held_out_scenario(study: PlacementStudy, scenario: Scenario, source: MotionSource) -> Scenario | None:
