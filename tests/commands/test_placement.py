@@ -9,7 +9,7 @@ import pytest
 from harness.errors import Outcome
 from harness.results.findings import read_placement
 from harness.results.findings.advice import Effort
-from harness.study.placement import answer, effort, question, question_clips
+from harness.study.placement import effort, question, question_clips, question_run
 from harness.study.placement.effort import Budget
 from harness.study.placement.placement_study import run_placement
 from tests.command import Command
@@ -48,11 +48,13 @@ def test_a_question_is_answered_alike_on_the_terminal_the_page_and_in_json(small
     findings = read_placement(out / "findings.json")
     shown, beside, _ = ended.out.splitlines()[-3:]
     tied = "left hand, or one of 2 places of 3 that cannot be told from it"  # the method moves no joint
-    assert shown.startswith(f"Wear one station for boxing: {tied}; ")
-    assert " on 7 held-out known performers (chosen on 7 performers)." in shown
+    assert shown.startswith(f"Wear one station for boxing: {tied} (chosen on 7 performers). It errs ")
+    assert shown.endswith(" on 7 held-out known performers.")
     assert beside.startswith("Two stations are not better: ")
-    assert f"<h1>{shown}" in (out / "report.html").read_text(encoding="utf-8")
-    assert ended.err.splitlines()[0].startswith("A search on 7 clips of 6 sets: at most ")
+    assert f"<h1>{shown.partition(' It errs')[0]}</h1>" in (out / "report.html").read_text(encoding="utf-8")
+    assert ended.err.splitlines()[0] == (
+        "A search on 7 clips of 6 sets: at most 42 cells to choose on and about 14 on held-out clips."
+    )
     assert ended.err.splitlines()[-1] == f"next: harness plot {out}"
     assert (findings.sizes, findings.effort, findings.split) == ((1, 2), "", "known")
     assert (findings.noise, findings.best[0].of, findings.best[0].held_out_clips) == ("clean", 3, 7)
@@ -125,8 +127,8 @@ def test_a_second_method_that_disagrees_is_the_headline(small: Small, command: C
     assert findings.station_costs == {"head": 2.0, "pelvis": 1.0}
     assert [point.cost for point in findings.front] == [1.0]
     assert findings.split == "new"
-    assert "new performers (a quick search)" in ended.content["answer"]
-    assert ended.content["answer"].startswith("Methods disagree") is not findings.second.agrees
+    assert "new performers" in ended.content["answer"]
+    assert ("both methods" in ended.content["answer"]) is not findings.second.agrees
 
 
 @pytest.mark.slow
@@ -144,19 +146,26 @@ def test_without_the_cells_for_every_set_stations_are_added_one_after_another(sm
 
 
 @pytest.mark.slow
-def test_a_late_search_says_so_and_goes_on(small: Small, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(answer, "LATE", 0.0)
+def test_a_late_search_says_so_with_the_cells_of_everything_that_it_does(
+    small: Small, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three places on eight performers, the best one on seven others, and all three again with the second method."""
+    clock = iter([0.0, *[600.0] * 10_000])
+    monkeypatch.setattr(question_run, "monotonic", lambda: next(clock))
     asked = question.PlacementQuestion(1, 1, ("boxing",), ("hand", "pelvis"), ONE_STATION, "clean", effort="quick")
     told: list[str] = []
     findings, outcome = run_placement(
-        replace(asked, second_method="none"), tmp_path / "out", announce=lambda news: told.append(str(news))
+        replace(asked, second_method=NO_STATION), tmp_path / "out", announce=lambda news: told.append(str(news))
     )
     assert outcome is Outcome.PASS
-    assert told[0].startswith(
-        "A quick search of 3 sets: at most 300 cells to choose on, about 1 min on two quiet cores"
+    assert told[0] == (
+        "A quick search of 3 sets: at most 24 cells to choose on, about 7 on held-out clips and 24 with "
+        f"{NO_STATION}; about 1 min on two quiet cores."
     )
-    assert told[1].startswith("The search goes on after 0 min: ")
+    assert told[1].startswith("The search goes on after 10 min: ")
+    assert f"About {10 * (24 + 7 + 24 - 1)} min more; " in told[1]  # the first cell took all of them
     assert findings.advice is not None
+    assert len(cell_names(tmp_path / "out")) == findings.planned == 24 + 7 + 24
 
 
 @pytest.mark.parametrize(
@@ -165,7 +174,7 @@ def test_a_late_search_says_so_and_goes_on(small: Small, tmp_path: Path, monkeyp
         (["--effort", "quick", "--clips", "7"], "--effort with --clips"),
         (["--effort", "quick", "--minutes", "7"], "--effort with --minutes"),
         (["--minutes", "2", "--clips", "7"], "--minutes with --clips"),
-        (["--with", "head,"], "--with 'head,' has an empty name"),
+        (["--with", "head,"], "The list 'head,' has an empty name"),
         (["--with", "nose"], "no place called 'nose'"),
         (["--with", "head,hand,pelvis", "--stations", "3"], "3 stations cannot contain the 4 of --with"),
         (["--cost", "nose=1"], "no place called 'nose'"),

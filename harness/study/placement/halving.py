@@ -61,6 +61,11 @@ class Race:
         """The best set; () if none was measured."""
         return next(iter(sort_by_cost(self.finalists)), ())
 
+    @property
+    def ties(self) -> tuple[StationNames, ...]:
+        """The other finalists that are not significantly worse than the best set, the best first."""
+        return tuple(row.stations for row in rank_sets("halve", "", self.finalists).rows[1:] if row.tied)
+
     def ranking(self, title: str) -> Ranking:
         """All sets, best first: the finalists with their ties, then those that were left out, the last one first."""
         rows = [replace(row, units=self.rounds[-1].units) for row in rank_sets("halve", title, self.finalists).rows]

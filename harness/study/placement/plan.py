@@ -59,6 +59,11 @@ class PlacementPlan:
         return 1.0 if margin_of(self.study.metric).rise_is_worse else -1.0
 
     @property
+    def unit(self) -> str:
+        """The unit of the metric."""
+        return DEFINITIONS[self.study.metric].unit
+
+    @property
     def places(self) -> tuple[CandidatePlace, ...]:
         """All candidate places."""
         return tuple(dict.fromkeys(place for unit in self.groups for place in unit))
@@ -143,7 +148,7 @@ class PlacementPlan:
             name=study.name,
             title=study.title,
             metric=study.metric,
-            unit=DEFINITIONS[study.metric].unit,
+            unit=self.unit,
             motion=self.motion,
             behaviours=tuple(dict.fromkeys(scenario.motion.behaviours)),
             methods=scenario.methods,

@@ -205,8 +205,8 @@ def test_a_condition_that_moves_a_station_has_cells_of_its_own(tmp_path: Path) -
     assert outcome is Outcome.PASS
     assert [condition.name for condition in findings.conditions][1:] == ["higher"]
     cells = [json.loads((cell / "cell.json").read_text()) for cell in (tmp_path / "out" / "cells").iterdir()]
-    angles = [cell["defined_by"]["stations"]["pelvis"]["around_deg"] for cell in cells if cell["stations"] == ["pelvis"]]
-    assert sorted(angles) == [90.0, 90.0, 165.0, 165.0]
+    places = [cell["defined_by"]["stations"]["pelvis"] for cell in cells if cell["stations"] == ["pelvis"]]
+    assert sorted(place["around_deg"] for place in places) == [90.0, 90.0, 165.0, 165.0]
 
 
 def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
