@@ -1,5 +1,6 @@
 """`harness placement` as a user asks it: a question without a file, its answer, and what is refused."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -114,21 +115,25 @@ def test_questions_of_other_places_share_the_cells_of_equal_sets(small: Small, t
 
 @pytest.mark.slow
 def test_a_second_method_that_disagrees_is_the_headline(small: Small, command: Command) -> None:
-    """The first method reads nothing, so that it takes any place; the second one needs the pelvis."""
+    """The first method reads nothing, so that it takes the cheaper place; the second one needs the pelvis."""
     words = ["placement", "--stations", "1", "--behaviour", "golf", "--places", "head,pelvis", "--noise", "clean"]
-    words += ["--cost", "head=2", "--baud", "57600", "--split", "subject", "--jobs", "1", "--effort", "quick"]
+    words += ["--cost", "pelvis=2", "--baud", "57600", "--split", "subject", "--jobs", "1", "--effort", "quick"]
     ended = command(*words, "--method", NO_STATION, "--second-method", ONE_STATION, "--json")
     findings = read_placement(Path("results/placement_golf_1/findings.json"))
     assert findings.second is not None
     assert findings.advice is not None
     (choice,) = findings.second.choices
-    assert findings.second.agrees is (findings.advice.best.stations == ("pelvis",))
+    assert (choice.chosen, choice.best, choice.worse, choice.shared) == (("head",), ("pelvis",), True, None)
+    assert findings.advice.best.stations == ("head",)
     assert (choice.of, choice.units) == (2, 8)
-    assert findings.station_costs == {"head": 2.0, "pelvis": 1.0}
+    assert findings.station_costs == {"head": 1.0, "pelvis": 2.0}
     assert [point.cost for point in findings.front] == [1.0]
     assert findings.split == "new"
     assert "new performers" in ended.content["answer"]
-    assert ("both methods" in ended.content["answer"]) is not findings.second.agrees
+    assert ended.content["answer"].startswith("No place of 2 is good under both methods for golf: ")
+    headline = re.search("<h1>(.*?)</h1>", Path("results/placement_golf_1/report.html").read_text(encoding="utf-8"))
+    assert headline is not None
+    assert headline[1].startswith("No place of 2 is good under both methods: ")
 
 
 @pytest.mark.slow

@@ -56,7 +56,7 @@ def short_answers(findings: PlacementFindings, advice: PlacementAdvice) -> list[
         none = _none_is_good(choice)
         return [f"{none}: {sets}{search}.", f"{none}: {sets}.", f"{none}: they differ by {worse}{search}."]
     wear, name = _wear(findings, choice.shared.stations), set_name(choice.shared.stations)
-    apart = f"They disagree: {second} errs {worse} more with the best of {first}."
+    apart = f"They disagree: {second} errs {worse} more with {first}'s best."
     return [
         f"{wear}, good under both methods{search}. {apart}",
         f"{wear}, good under both methods. {apart}",

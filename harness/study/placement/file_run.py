@@ -66,7 +66,7 @@ class FileRun(StudyRun):
         tested = self._sets_to_test([stations.stations for stations in best], [*alternatives, *ends])
         requests = [plan.request(scenario, compared) for scenario in plan.condition_scenarios.values()]
         self.cache.run_missing([*([plan.request(plan.held_out, tested)] if plan.held_out else []), *requests])
-        held = self._costs_in(plan.held_out, tested) if plan.held_out else {}
+        held = costs_by_name(self.measure_in(plan.held_out, tested)) if plan.held_out else {}
         conditions = self._condition_costs(compared)
         names = list(map(names_of_places, compared))
         errors = {s.stations: set_error(s.stations, plan.costs(held.get(s.stations, {}))) for s in best}
@@ -135,12 +135,6 @@ class FileRun(StudyRun):
             tested += [claimed, full]
         return list(dict.fromkeys(tested))
 
-    def _costs_in(
-        self, scenario: Scenario, sets: Sequence[StationSet], methods: tuple[str, ...] = ()
-    ) -> dict[StationNames, Costs]:
-        """Costs of sets in a scenario, with its methods or some of them."""
-        return costs_by_name(self.measure_in(scenario, sets, methods))
-
     def _condition_costs(self, compared: Sequence[StationSet]) -> list[ConditionCosts]:
         """Costs under the study's own condition, with each of its methods if it has several, and in others."""
         if not compared:
@@ -150,10 +144,12 @@ class FileRun(StudyRun):
         conditions = [replace(own, costs=costs_by_name({stations: self.costs[stations] for stations in compared}))]
         if len(scenario.methods) > 1:
             conditions += [
-                ConditionCosts(m, "method", self._costs_in(scenario, compared, (m,))) for m in scenario.methods
+                ConditionCosts(m, "method", costs_by_name(self.measure_in(scenario, compared, (m,))))
+                for m in scenario.methods
             ]
         for name, other in self.plan.condition_scenarios.items():
-            conditions.append(ConditionCosts(name, _condition_kind(scenario, other), self._costs_in(other, compared)))
+            costs = costs_by_name(self.measure_in(other, compared))
+            conditions.append(ConditionCosts(name, _condition_kind(scenario, other), costs))
         return conditions
 
     def _claims(

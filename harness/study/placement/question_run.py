@@ -67,10 +67,11 @@ class QuestionRun(StudyRun):
         errors = {names: self._error(names, by_unit) for names, by_unit in held.items()}
         steps = compare_levels(levels, held)
         advice = advise(levels, steps, errors, {race.size: race for race in answered})
+        stations = count_noun(len(self.plan.places), "station")
         return self.findings_of(
             costs,
             best=tuple(_best_set(race, errors[race.best]) for race in answered),
-            rankings=tuple(race.ranking(self._title(race)) for race in races if race.rounds),
+            rankings=tuple(race.ranking(f"{race.size} of {stations}") for race in races if race.rounds),
             contributions=tuple(self._contributions(races, stepwise)),
             notes=tuple(self._notes(races, stepwise)),
             power=self._power(answered),
@@ -155,10 +156,6 @@ class QuestionRun(StudyRun):
     def _error(self, names: StationNames, costs: Costs) -> SetError:
         return set_error(names, costs, self.asked.price(names) if self.asked.station_costs else None)
 
-    def _title(self, race: Race) -> str:
-        """The title of a race's ranking, such as "3 of 8 stations"."""
-        return f"{race.size} of {count_noun(len(self.plan.places), 'station')}"
-
     def _contributions(self, races: Sequence[Race], stepwise: bool) -> Iterator[MarginalContribution]:
         """What each place contributes, on the units on which every set was measured."""
         free = [group for group in self.plan.groups if group not in self.asked.base]
@@ -189,12 +186,11 @@ class QuestionRun(StudyRun):
         method, choices, errors = self.asked.question.second, list[SecondChoice](), list[SetError]()
         if not method:
             return None
-        scenario, price = replace(self.plan.scenario, methods=(method,)), self.asked.price
+        scenario = replace(self.plan.scenario, methods=(method,))
         for race in races:
             order = sort_by_cost(race.finalists)
             chosen = advice.best.stations if advice and advice.best.stations in order else race.best
-            sets = [names for names in order if price(names) <= price(chosen)][:FINALISTS]
-            places = self._places(list(dict.fromkeys([*sets, chosen])))
+            places = self._places(list(dict.fromkeys([*order[:FINALISTS], chosen])))
             costs = costs_by_name(self.measure_on(scenario, self._first_units(race.rounds[-1].units), places))
             if choice := compare_second(chosen, costs, race.ties if chosen == race.best else ()):
                 choices.append(choice)

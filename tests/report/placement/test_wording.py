@@ -243,7 +243,7 @@ def test_a_set_that_is_good_under_both_methods_comes_before_their_disagreement(a
     )
     assert headline_sentence(findings) == (
         "Wear both hands, good under both methods (a quick search). They disagree: ik errs 0.8 deg (0.5 to 1.1) more "
-        "with the best of expert_map."
+        "with expert_map's best."
     )
     assert recommended_set(findings) == BOTH
     other = placement_sentence(disputed(asked, BOTH, ("right_hand", "pelvis")))

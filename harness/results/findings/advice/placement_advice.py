@@ -79,7 +79,7 @@ class SecondChoice:
     chosen: Stations
     """The set that the first method chose."""
     best: Stations
-    """The best set under the second method, among those that it measured; with costs, that cost no more."""
+    """The best set under the second method, among those that it measured."""
     difference: float | None
     """Error of `chosen` minus that of `best` under the second method, positive if `best` is better; 0 if they agree."""
     low: float | None = None
