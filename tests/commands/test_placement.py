@@ -130,10 +130,10 @@ def test_a_second_method_that_disagrees_is_the_headline(small: Small, command: C
     assert [point.cost for point in findings.front] == [1.0]
     assert findings.split == "new"
     assert "new performers" in ended.content["answer"]
-    assert ended.content["answer"].startswith("No place of 2 is good under both methods for golf: ")
+    assert ended.content["answer"].startswith("None of 2 places is good under both methods for golf: ")
     headline = re.search("<h1>(.*?)</h1>", Path("results/placement_golf_1/report.html").read_text(encoding="utf-8"))
     assert headline is not None
-    assert headline[1].startswith("No place of 2 is good under both methods: ")
+    assert headline[1].startswith("None of 2 places is good under both methods")
 
 
 @pytest.mark.slow

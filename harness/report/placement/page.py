@@ -136,7 +136,7 @@ def search_text(findings: PlacementFindings) -> str:
     for each in findings.rounds:
         by_size.setdefault(each.size, []).append(each)
     rounds = [
-        f"{count_noun(size, 'station')}: {of[0].sets:,} sets on {count_noun(of[0].units, 'unit')}"
+        f"{count_noun(size, 'station')}: {count_noun(of[0].sets, 'set')} on {count_noun(of[0].units, 'unit')}"
         + "".join(f", {each.sets:,} on {each.units}" for each in of[1:])
         for size, of in by_size.items()
     ]

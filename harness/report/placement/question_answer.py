@@ -28,8 +28,8 @@ def advice_sentences(findings: PlacementFindings, advice: PlacementAdvice) -> li
     more = f"{second} errs {_difference(findings, choice)} more"
     if choice.shared is None:
         return [
-            f"{_none_is_good(choice)} for {behaviour_names(findings)}: {first} prefers {chosen}, {second} {better} "
-            f"({_search(findings)}).",
+            f"{_none_is_good(choice)} under both methods for {behaviour_names(findings)}: {first} prefers {chosen}, "
+            f"{second} {better} ({_search(findings)}).",
             f"With {chosen}, {more} than with {better}.",
             f"Under {first}, the error of {chosen} is {_error(findings, best)}.",
         ]
@@ -52,9 +52,15 @@ def short_answers(findings: PlacementFindings, advice: PlacementAdvice) -> list[
     first, second = _methods(findings)
     worse = _difference(findings, choice)
     if choice.shared is None:
-        sets = f"{first} prefers {set_name(choice.chosen)}, {second} {set_name(choice.best)}, by {worse}"
-        none = _none_is_good(choice)
-        return [f"{none}: {sets}{search}.", f"{none}: {sets}.", f"{none}: they differ by {worse}{search}."]
+        sets = f"{first} prefers {set_name(choice.chosen)}, {second} {set_name(choice.best)}"
+        none, rough = _none_is_good(choice), Interval(worse.value, unit=findings.unit)
+        return [
+            f"{none} under both methods: {sets}, by {worse}{search}.",
+            f"{none} under both methods: {sets}, by {worse}.",
+            f"{none} under both: {sets}, by {worse}.",
+            f"{none} under both: {sets}, by {rough}.",
+            f"{none} under both methods, which differ by {worse}{search}.",
+        ]
     wear, name = _wear(findings, choice.shared.stations), set_name(choice.shared.stations)
     apart = f"They disagree: {second} errs {worse} more with {first}'s best."
     return [
@@ -88,7 +94,7 @@ def _ties(advice: PlacementAdvice) -> str:
 
 
 def _none_is_good(choice: SecondChoice) -> str:
-    return f"No {set_noun(len(choice.chosen))} of {choice.of} is good under both methods"
+    return f"None of {choice.of} {_nouns(choice.chosen)} is good"
 
 
 def _nouns(stations: StationNames) -> str:

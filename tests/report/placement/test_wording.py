@@ -253,15 +253,24 @@ def test_a_set_that_is_good_under_both_methods_comes_before_their_disagreement(a
 def test_without_a_set_that_is_good_under_both_the_headline_has_both_choices(asked: PlacementFindings) -> None:
     findings = disputed(asked)
     assert placement_sentence(findings) == (
-        "No pair of 4 is good under both methods for walking and boxing: expert_map prefers left hand + pelvis, ik "
+        "None of 4 pairs is good under both methods for walking and boxing: expert_map prefers left hand + pelvis, ik "
         "both hands (a quick search). With left hand + pelvis, ik errs 0.8 deg (0.5 to 1.1) more than with both hands. "
         "Under expert_map, the error of left hand + pelvis is 4.14 deg (3.94 to 4.34) on 32 held-out known performers."
     )
     assert headline_sentence(findings) == (
-        "No pair of 4 is good under both methods: expert_map prefers left hand + pelvis, ik both hands, by 0.8 deg "
+        "None of 4 pairs is good under both methods: expert_map prefers left hand + pelvis, ik both hands, by 0.8 deg "
         "(0.5 to 1.1)."
     )
     assert recommended_set(findings) == TWO
+    four, other = ("right_hand", "left_hand", "right_ankle", "left_ankle"), ("right_hand", "left_hand", "left_ankle")
+    assert findings.advice is not None
+    assert findings.second is not None
+    choice = replace(findings.second.choices[1], chosen=four, best=(*other, "pelvis"), difference=0.27)
+    longer = replace(findings.advice, best=replace(findings.advice.best, stations=four))
+    assert headline_sentence(replace(findings, advice=longer, second=SecondMethod("ik", (choice,)))) == (
+        "None of 4 sets is good under both: expert_map prefers both hands + both ankles, ik both hands + left ankle + "
+        "pelvis, by 0.27 deg."
+    )
 
 
 def test_a_disagreement_that_is_not_significant_changes_nothing(asked: PlacementFindings) -> None:
@@ -296,7 +305,7 @@ def test_every_headline_has_two_lines_at_most(
     )
     headline = headline_sentence(long)
     assert len(headline) <= MOST_LETTERS
-    assert ("both methods" in headline) is worse
+    assert ("good under both" in headline) is worse
     in_file = replace(long, advice=None, sizes=tuple(range(1, 13)), best=(BestSet(chosen, (other,) * 480, of=495),))
     assert len(headline_sentence(in_file)) <= MOST_LETTERS
 
