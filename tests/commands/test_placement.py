@@ -16,6 +16,7 @@ from harness.study.placement.placement_study import run_placement
 from tests.command import Command
 
 ONE_STATION = "tests.study.placement.one_station:OneStation"
+BENT = "tests.study.placement.one_station:Bent"
 NO_STATION = "tests.study.placement.one_station:NoStation"
 Small = Callable[..., None]
 
@@ -118,22 +119,24 @@ def test_a_second_method_that_disagrees_is_the_headline(small: Small, command: C
     """The first method reads nothing, so that it takes the cheaper place; the second one needs the pelvis."""
     words = ["placement", "--stations", "1", "--behaviour", "golf", "--places", "head,pelvis", "--noise", "clean"]
     words += ["--cost", "pelvis=2", "--baud", "57600", "--split", "subject", "--jobs", "1", "--effort", "quick"]
-    ended = command(*words, "--method", NO_STATION, "--second-method", ONE_STATION, "--json")
+    ended = command(*words, "--method", NO_STATION, "--second-method", BENT, "--json")
     findings = read_placement(Path("results/placement_golf_1/findings.json"))
     assert findings.second is not None
     assert findings.advice is not None
     (choice,) = findings.second.choices
-    assert (choice.chosen, choice.best, choice.worse, choice.shared) == (("head",), ("pelvis",), True, None)
+    assert (choice.chosen, choice.best, choice.worse) == (("head",), ("pelvis",), True)
+    assert choice.shared is not None
+    assert (choice.shared.stations, choice.shared.cost, choice.shared.units) == (("pelvis",), 2.0, 7)
     assert findings.advice.best.stations == ("head",)
     assert (choice.of, choice.units) == (2, 8)
     assert findings.station_costs == {"head": 1.0, "pelvis": 2.0}
     assert [point.cost for point in findings.front] == [1.0]
     assert findings.split == "new"
     assert "new performers" in ended.content["answer"]
-    assert ended.content["answer"].startswith("None of 2 places is good under both methods for golf: ")
-    headline = re.search("<h1>(.*?)</h1>", Path("results/placement_golf_1/report.html").read_text(encoding="utf-8"))
-    assert headline is not None
-    assert headline[1].startswith("None of 2 places is good under both")
+    assert ended.content["answer"].startswith("Wear one station for golf: pelvis, good under both methods (a quick ")
+    content = Path("results/placement_golf_1/report.html").read_text(encoding="utf-8")
+    assert re.search(r"<h1>Wear [^<]*pelvis, good under both methods", content)
+    assert "The body with the recommended stations pelvis" in content
 
 
 @pytest.mark.slow

@@ -53,7 +53,7 @@ def short_answers(findings: PlacementFindings, advice: PlacementAdvice) -> list[
     worse = _difference(findings, choice)
     if choice.shared is None:
         sets = f"{first} prefers {set_name(choice.chosen)}, {second} {set_name(choice.best)}"
-        none, rough = _none_is_good(choice), Interval(worse.value, unit=findings.unit)
+        none, rough = _none_is_good(choice), str(worse).partition(" (")[0]
         return [
             f"{none} under both methods: {sets}, by {worse}{search}.",
             f"{none} under both methods: {sets}, by {worse}.",
@@ -68,6 +68,7 @@ def short_answers(findings: PlacementFindings, advice: PlacementAdvice) -> list[
         f"{wear}, good under both methods. {apart}",
         f"Wear {name}, good under both methods{search}. {apart}",
         f"Wear {name}, good under both methods. {apart}",
+        f"Wear {name}, good under both methods{search}. Their best sets differ by {worse}.",
         f"Wear {name}, good under both methods. Their best sets differ by {worse}.",
         f"A set of {count_stations(len(choice.chosen))} is good under both methods. Their best sets differ by {worse}.",
     ]

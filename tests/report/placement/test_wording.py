@@ -265,7 +265,9 @@ def test_without_a_set_that_is_good_under_both_the_headline_has_both_choices(ask
     four, other = ("right_hand", "left_hand", "right_ankle", "left_ankle"), ("right_hand", "left_hand", "left_ankle")
     assert findings.advice is not None
     assert findings.second is not None
-    choice = replace(findings.second.choices[1], chosen=four, best=(*other, "pelvis"), difference=0.27)
+    choice = replace(
+        findings.second.choices[1], chosen=four, best=(*other, "pelvis"), difference=0.266, low=0.06, high=0.73
+    )
     longer = replace(findings.advice, best=replace(findings.advice.best, stations=four))
     assert headline_sentence(replace(findings, advice=longer, second=SecondMethod("ik", (choice,)))) == (
         "None of 4 sets is good under both: expert_map prefers both hands + both ankles, ik both hands + left ankle + "
