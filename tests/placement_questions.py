@@ -22,13 +22,13 @@ from harness.report.placement.wording import set_name
 from harness.results import open_study
 from harness.results.findings import PlacementFindings, StationNames
 from harness.results.findings.advice import Effort
+from harness.study.placement.candidates import names_of_places
 from harness.study.placement.placement_study import run_placement
 from harness.study.placement.plan import plan_study
 from harness.study.placement.question import PlacementQuestion, list_sets, question_study
 from harness.study.placement.question_clips import FRESH_PERFORMERS, builtin_units
 from harness.study.placement.question_run import QuestionRun
 from harness.study.placement.ranking import Costs
-from harness.study.placement.search import names_of_places
 from harness.study.placement.set_results import SetResults
 
 MOST_RATIO, MOST_HOURS = 1.03, 2.0

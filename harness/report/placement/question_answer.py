@@ -43,7 +43,7 @@ def advice_sentences(findings: PlacementFindings, advice: PlacementAdvice) -> li
 
 
 def short_answers(findings: PlacementFindings, advice: PlacementAdvice) -> list[str]:
-    """The same in few words for a headline, the longest first."""
+    """The answer in few words for a headline, the longest form first."""
     choice, best, search = disputed_choice(findings), advice.best, f" ({_search(findings)})"
     if choice is None:
         wear, name = _wear(findings, best.stations), set_name(best.stations)

@@ -20,7 +20,7 @@ from harness.results.findings import (
 )
 from harness.study.placement import search
 from harness.study.placement.advice import set_error
-from harness.study.placement.candidates import StationSet, select_groups, station_set
+from harness.study.placement.candidates import StationSet, names_of_places, select_groups, station_set
 from harness.study.placement.config import PublishedClaim
 from harness.study.placement.plan import is_refined
 from harness.study.placement.power import choose_pilot, estimate_power
@@ -36,7 +36,7 @@ from harness.study.placement.ranking import (
     sets_of_claim,
 )
 from harness.study.placement.refinement import refine_set
-from harness.study.placement.search import ModeResult, names_of_places
+from harness.study.placement.search import ModeResult
 from harness.study.placement.study_run import StudyRun, add_held_out_error, choice_note, costs_by_name
 
 

@@ -19,7 +19,7 @@ from harness.results import current_circumstances
 from harness.results.findings import CandidatePlace, PlacementFindings
 from harness.score import DEFINITIONS
 from harness.study.placement import search
-from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
+from harness.study.placement.candidates import CandidateGroup, StationSet, names_of_places, select_groups, station_set
 from harness.study.placement.config import (
     PlacementStudy,
     base_scenario,
@@ -28,7 +28,6 @@ from harness.study.placement.config import (
 )
 from harness.study.placement.ranking import Costs, sets_of_claim
 from harness.study.placement.refinement import check_unit_count
-from harness.study.placement.search import names_of_places
 from harness.study.placement.set_results import SetRequest, clips_of_units, link_rate_hz
 
 

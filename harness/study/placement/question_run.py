@@ -15,14 +15,14 @@ from harness.experiment.scenarios import Scenario, open_scenario_motion
 from harness.results.findings import BestSet, MarginalContribution, PlacementFindings, StationNames, StatisticalPower
 from harness.results.findings.advice import PlacementAdvice, SecondChoice, SecondMethod, SetError
 from harness.study.placement.advice import advise, compare_levels, compare_second, find_front, set_error
-from harness.study.placement.candidates import StationSet
+from harness.study.placement.candidates import StationSet, names_of_places
 from harness.study.placement.effort import FINALISTS, CellForecast, last_round, plan_rounds
 from harness.study.placement.halving import Race, SearchLimits, add_stations, race_all
 from harness.study.placement.power import estimate_power
 from harness.study.placement.question import QuestionStudy, count_sets, list_sets
 from harness.study.placement.question_clips import Units
 from harness.study.placement.ranking import Costs, best_by_size, sort_by_cost
-from harness.study.placement.search import contribution, names_of_places, shapley_contributions
+from harness.study.placement.search import contribution, shapley_contributions
 from harness.study.placement.study_run import StudyRun, add_held_out_error, choice_note, costs_by_name
 
 LATE = 1.5

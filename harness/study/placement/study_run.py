@@ -11,10 +11,9 @@ from harness.compare import count_units
 from harness.experiment.scenarios import Scenario
 from harness.results.findings import BestSet, PlacementFindings, StationNames
 from harness.results.findings.advice import SetError
-from harness.study.placement.candidates import StationSet
+from harness.study.placement.candidates import StationSet, names_of_places
 from harness.study.placement.plan import PlacementPlan
 from harness.study.placement.ranking import Costs, summarise_set
-from harness.study.placement.search import names_of_places
 from harness.study.placement.set_results import SetResults
 
 
@@ -49,7 +48,7 @@ class StudyRun:
 
 
 def costs_by_name(costs: Mapping[StationSet, Costs]) -> dict[StationNames, Costs]:
-    """The same costs by the names of the sets."""
+    """Costs by the names of the sets instead of their places."""
     return {names_of_places(stations): by_unit for stations, by_unit in costs.items()}
 
 

@@ -7,7 +7,7 @@ import pytest
 from harness.compare import compare_paired
 from harness.core.seeds import generator
 from harness.results.findings import StationNames
-from harness.study.placement.candidates import Candidate, StationSet, make_candidate_groups
+from harness.study.placement.candidates import Candidate, StationSet, make_candidate_groups, names_of_places
 from harness.study.placement.effort import (
     EFFORTS,
     FINALISTS,
@@ -20,7 +20,6 @@ from harness.study.placement.effort import (
 from harness.study.placement.halving import Race, SearchLimits, add_stations, race_all
 from harness.study.placement.question import count_sets, list_sets
 from harness.study.placement.ranking import Costs
-from harness.study.placement.search import names_of_places
 
 PLACES = make_candidate_groups(
     [
