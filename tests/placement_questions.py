@@ -22,13 +22,13 @@ from harness.report.placement.wording import set_name
 from harness.results import open_study
 from harness.results.findings import PlacementFindings, StationNames
 from harness.results.findings.advice import Effort
-from harness.study.placement.answer import QuestionRun
+from harness.study.placement.candidates import names_of_places
 from harness.study.placement.placement_study import run_placement
 from harness.study.placement.plan import plan_study
 from harness.study.placement.question import PlacementQuestion, list_sets, question_study
 from harness.study.placement.question_clips import FRESH_PERFORMERS, builtin_units
+from harness.study.placement.question_run import QuestionRun
 from harness.study.placement.ranking import Costs
-from harness.study.placement.search import names_of_places
 from harness.study.placement.set_results import SetResults
 
 MOST_RATIO, MOST_HOURS = 1.03, 2.0
@@ -114,7 +114,7 @@ def fresh_errors(
     with open_study(out, {"placement": asked.study.name, "motion": plan.motion, "seed": asked.scenario.seed}):
         (out / "cells").mkdir(exist_ok=True)
         cache = SetResults(out, None, executor, "", lambda last, done, planned: None, plan.study.link)
-        run = QuestionRun(asked, plan, cache, lambda line: None)
+        run = QuestionRun(plan, cache, asked, lambda line: None)
         units = builtin_units(FRESH_PERFORMERS, tuple(dict.fromkeys(question.behaviours)))
         errors = run.measure_on(plan.scenario, units, [listed[names] for names in sets])
     return {names_of_places(stations): mean_error(by_unit) for stations, by_unit in errors.items()}

@@ -216,7 +216,7 @@ def split_list(text: str | None) -> list[str]:
     """The entries of a list that is separated by commas outside brackets; [] without one; BadInput for an empty one."""
     entries = [entry.strip() for entry in split_outside_brackets(text, ",")] if text else []
     if not all(entries):
-        raise BadInput(f"The list {text!r} has an empty name.", "Separate names by commas, such as ik,ridge.")
+        raise BadInput(f"The list {text!r} has an empty name.", "Separate names by commas.")
     return entries
 
 

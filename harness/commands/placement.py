@@ -5,7 +5,16 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.flags import Verbs, add_verb, folder_of, positive_float, positive_int, process_count, refuse_flags
+from harness.commands.flags import (
+    Verbs,
+    add_verb,
+    folder_of,
+    positive_float,
+    positive_int,
+    process_count,
+    refuse_flags,
+    split_list,
+)
 from harness.commands.output import long_work, print_result, print_status, record_content, this_command, this_words
 from harness.core.progress import show_steps
 from harness.errors import BadInput, Outcome
@@ -87,8 +96,9 @@ def parse_costs(text: str) -> dict[str, float]:
 
 def run_placement(args: argparse.Namespace) -> Outcome:
     from harness.experiment.workers import process_executor
+    from harness.report.placement.answer import placement_sentence
     from harness.report.placement.page import placement_text, write_placement_page
-    from harness.report.placement.wording import placement_sentence, size_sentences
+    from harness.report.placement.question_answer import size_sentences
     from harness.results.files import FINDINGS
     from harness.study.placement import placement_study
 
@@ -131,14 +141,14 @@ def _read_question(args: argparse.Namespace) -> "PlacementQuestion | None":
     limits = [name for name in ("effort", "minutes", "clips") if getattr(args, name) is not None]
     if len(limits) > 1:
         raise BadInput(f"--{limits[0]} with --{limits[1]}.", "Each of them limits the search: name one.")
-    base = _split_names(getattr(args, "with"), "--with")
+    base = tuple(split_list(getattr(args, "with")))
     usual = len(select_places(base)) + 1 if base else DEFAULT_STATIONS
     fewest, most = args.stations or (usual, usual)
     return PlacementQuestion(
         fewest,
         most,
-        _split_names(args.behaviour, "--behaviour") or ("walking",),
-        places=_split_names(args.places, "--places"),
+        tuple(split_list(args.behaviour)) or ("walking",),
+        places=tuple(split_list(args.places)),
         method=args.method or DEFAULT_METHOD,
         noise=args.noise or "default",
         constellation=args.physics or "",
@@ -154,19 +164,9 @@ def _read_question(args: argparse.Namespace) -> "PlacementQuestion | None":
     )
 
 
-def _split_names(text: str | None, flag: str) -> tuple[str, ...]:
-    """Names separated by commas, () without a text; BadInput for an empty one."""
-    if text is None:
-        return ()
-    names = tuple(name.strip() for name in text.split(","))
-    if not all(names):
-        raise BadInput(f"{flag} {text!r} has an empty name.", "Separate names by commas.")
-    return names
-
-
 def _announce(news: "StatisticalPower | str") -> None:
     """Tell on stderr what the cells can show and how long they take, or how a search goes on."""
-    from harness.report.placement.wording import power_sentences
+    from harness.report.placement.power_wording import power_sentences
 
     for line in [news] if isinstance(news, str) else power_sentences(news):
         print_status(line)

@@ -1,5 +1,6 @@
 """`harness placement` as a user asks it: a question without a file, its answer, and what is refused."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,12 +10,13 @@ import pytest
 from harness.errors import Outcome
 from harness.results.findings import read_placement
 from harness.results.findings.advice import Effort
-from harness.study.placement import answer, effort, question, question_clips
+from harness.study.placement import effort, question, question_clips, question_run
 from harness.study.placement.effort import Budget
 from harness.study.placement.placement_study import run_placement
 from tests.command import Command
 
 ONE_STATION = "tests.study.placement.one_station:OneStation"
+BENT = "tests.study.placement.one_station:Bent"
 NO_STATION = "tests.study.placement.one_station:NoStation"
 Small = Callable[..., None]
 
@@ -48,11 +50,13 @@ def test_a_question_is_answered_alike_on_the_terminal_the_page_and_in_json(small
     findings = read_placement(out / "findings.json")
     shown, beside, _ = ended.out.splitlines()[-3:]
     tied = "left hand, or one of 2 places of 3 that cannot be told from it"  # the method moves no joint
-    assert shown.startswith(f"Wear one station for boxing: {tied}; ")
-    assert " on 7 held-out known performers (chosen on 7 performers)." in shown
+    assert shown.startswith(f"Wear one station for boxing: {tied} (chosen on 7 performers). It errs ")
+    assert shown.endswith(" on 7 held-out known performers.")
     assert beside.startswith("Two stations are not better: ")
-    assert f"<h1>{shown}" in (out / "report.html").read_text(encoding="utf-8")
-    assert ended.err.splitlines()[0].startswith("A search on 7 clips of 6 sets: at most ")
+    assert f"<h1>{shown.partition(' It errs')[0]}</h1>" in (out / "report.html").read_text(encoding="utf-8")
+    assert ended.err.splitlines()[0] == (
+        "A search on 7 clips of 6 sets: at most 42 cells to choose on and about 14 on held-out clips."
+    )
     assert ended.err.splitlines()[-1] == f"next: harness plot {out}"
     assert (findings.sizes, findings.effort, findings.split) == ((1, 2), "", "known")
     assert (findings.noise, findings.best[0].of, findings.best[0].held_out_clips) == ("clean", 3, 7)
@@ -92,22 +96,47 @@ def test_efforts_rounds_and_runs_share_their_cells(small: Small, tmp_path: Path)
 
 
 @pytest.mark.slow
+def test_questions_of_other_places_share_the_cells_of_equal_sets(small: Small, tmp_path: Path) -> None:
+    """Three pairs of three places on eight performers; then the ten of five places and, all among these, two pairs
+    that are worn on both sides. Of each question the best set is tested on seven others."""
+    small(quick=80)
+    asked = question.PlacementQuestion(2, 2, ("boxing",), ("hand", "pelvis"), ONE_STATION, "clean", effort="quick")
+    asked, tested = replace(asked, second_method="none"), set[tuple[str, ...]]()
+    for changes, sets in (
+        ({}, 3),
+        ({"places": ("hand", "pelvis", "head", "torso")}, 10),
+        ({"places": ("hand", "head", "pelvis", "torso"), "symmetric": True}, 10),
+    ):
+        findings, outcome = run_placement(replace(asked, **changes), tmp_path / "out")
+        assert outcome is Outcome.PASS
+        assert findings.rounds[-1].units == 8
+        tested.add(findings.best[0].stations)
+        assert len(cell_names(tmp_path / "out")) == sets * 8 + 7 * len(tested)
+
+
+@pytest.mark.slow
 def test_a_second_method_that_disagrees_is_the_headline(small: Small, command: Command) -> None:
-    """The first method reads nothing, so that it takes any place; the second one needs the pelvis."""
+    """The first method reads nothing, so that it takes the cheaper place; the second one needs the pelvis."""
     words = ["placement", "--stations", "1", "--behaviour", "golf", "--places", "head,pelvis", "--noise", "clean"]
-    words += ["--cost", "head=2", "--baud", "57600", "--split", "subject", "--jobs", "1", "--effort", "quick"]
-    ended = command(*words, "--method", NO_STATION, "--second-method", ONE_STATION, "--json")
+    words += ["--cost", "pelvis=2", "--baud", "57600", "--split", "subject", "--jobs", "1", "--effort", "quick"]
+    ended = command(*words, "--method", NO_STATION, "--second-method", BENT, "--json")
     findings = read_placement(Path("results/placement_golf_1/findings.json"))
     assert findings.second is not None
     assert findings.advice is not None
     (choice,) = findings.second.choices
-    assert findings.second.agrees is (findings.advice.best.stations == ("pelvis",))
+    assert (choice.chosen, choice.best, choice.worse) == (("head",), ("pelvis",), True)
+    assert choice.shared is not None
+    assert (choice.shared.stations, choice.shared.cost, choice.shared.units) == (("pelvis",), 2.0, 7)
+    assert findings.advice.best.stations == ("head",)
     assert (choice.of, choice.units) == (2, 8)
-    assert findings.station_costs == {"head": 2.0, "pelvis": 1.0}
+    assert findings.station_costs == {"head": 1.0, "pelvis": 2.0}
     assert [point.cost for point in findings.front] == [1.0]
     assert findings.split == "new"
-    assert "new performers (a quick search)" in ended.content["answer"]
-    assert ended.content["answer"].startswith("Methods disagree") is not findings.second.agrees
+    assert "new performers" in ended.content["answer"]
+    assert ended.content["answer"].startswith("Wear one station for golf: pelvis, good under both methods (a quick ")
+    content = Path("results/placement_golf_1/report.html").read_text(encoding="utf-8")
+    assert re.search(r"<h1>Wear [^<]*pelvis, good under both methods", content)
+    assert "The body with the recommended stations pelvis" in content
 
 
 @pytest.mark.slow
@@ -125,19 +154,26 @@ def test_without_the_cells_for_every_set_stations_are_added_one_after_another(sm
 
 
 @pytest.mark.slow
-def test_a_late_search_says_so_and_goes_on(small: Small, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(answer, "LATE", 0.0)
+def test_a_late_search_says_so_with_the_cells_of_everything_that_it_does(
+    small: Small, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three places on eight performers, the best one on seven others, and all three again with the second method."""
+    clock = iter([0.0, *[600.0] * 10_000])
+    monkeypatch.setattr(question_run, "monotonic", lambda: next(clock))
     asked = question.PlacementQuestion(1, 1, ("boxing",), ("hand", "pelvis"), ONE_STATION, "clean", effort="quick")
     told: list[str] = []
     findings, outcome = run_placement(
-        replace(asked, second_method="none"), tmp_path / "out", announce=lambda news: told.append(str(news))
+        replace(asked, second_method=NO_STATION), tmp_path / "out", announce=lambda news: told.append(str(news))
     )
     assert outcome is Outcome.PASS
-    assert told[0].startswith(
-        "A quick search of 3 sets: at most 300 cells to choose on, about 1 min on two quiet cores"
+    assert told[0] == (
+        "A quick search of 3 sets: at most 24 cells to choose on, about 7 on held-out clips and 24 with "
+        f"{NO_STATION}; about 1 min on two quiet cores."
     )
-    assert told[1].startswith("The search goes on after 0 min: ")
+    assert told[1].startswith("The search goes on after 10 min: ")
+    assert f"About {10 * (24 + 7 + 24 - 1)} min more; " in told[1]  # the first cell took all of them
     assert findings.advice is not None
+    assert len(cell_names(tmp_path / "out")) == findings.planned == 24 + 7 + 24
 
 
 @pytest.mark.parametrize(
@@ -146,7 +182,7 @@ def test_a_late_search_says_so_and_goes_on(small: Small, tmp_path: Path, monkeyp
         (["--effort", "quick", "--clips", "7"], "--effort with --clips"),
         (["--effort", "quick", "--minutes", "7"], "--effort with --minutes"),
         (["--minutes", "2", "--clips", "7"], "--minutes with --clips"),
-        (["--with", "head,"], "--with 'head,' has an empty name"),
+        (["--with", "head,"], "The list 'head,' has an empty name"),
         (["--with", "nose"], "no place called 'nose'"),
         (["--with", "head,hand,pelvis", "--stations", "3"], "3 stations cannot contain the 4 of --with"),
         (["--cost", "nose=1"], "no place called 'nose'"),

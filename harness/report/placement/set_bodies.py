@@ -67,19 +67,19 @@ def draw_set_bodies(
 
 
 def tied_sets_blocks(findings: PlacementFindings, recommended: StationNames) -> list[Block]:
-    """The recommended set and those tied with it, as bodies and as a table; nothing without ties."""
-    ties = next((best.ties for best in findings.best if best.stations == recommended), ())
-    if findings.advice and findings.advice.best.stations == recommended:
-        ties = findings.advice.ties
+    """The best set of the recommended size and those tied with it, as bodies and as a table; nothing without ties."""
+    first, ties = recommended, next((best.ties for best in findings.best if best.stations == recommended), ())
+    if findings.advice:
+        first, ties = findings.advice.best.stations, findings.advice.ties
     if not ties:
         return []
-    sets = [recommended, *ties]
+    sets = [first, *ties]
     errors = [set_error(findings, findings.of(stations)) for stations in sets]
     bodies = [
-        SetBody(stations, error.number, "recommended" if n == 0 else "")
-        for n, (stations, error) in enumerate(zip(sets, errors, strict=True))
+        SetBody(stations, error.number, "recommended" if stations == recommended else "")
+        for stations, error in zip(sets, errors, strict=True)
     ]
-    caption = "The recommended set and sets of the same size that are not significantly worse, the best first."
+    caption = "The best set of this size and those that are not significantly worse, the best first."
     rows = [[set_name(stations), error] for stations, error in zip(sets, errors, strict=True)]
     table = DataTable(["tied sets, the best first", "error"], rows, label="tied sets", most_printed=MOST_BODIES)
     return [Drawing(partial(draw_set_bodies, findings, bodies, "tied_sets", "Tied sets", caption), table)]
@@ -104,15 +104,17 @@ def second_method_blocks(findings: PlacementFindings) -> list[Block]:
             set_name(choice.best),
             Interval.of(choice.difference, choice.low, choice.high, signed=True),
             "yes" if choice.worse else "no",
+            set_name(choice.shared.stations) if choice.shared else "none" if choice.worse else "",
             choice.units,
         ]
         for choice in second.choices
     ]
     head = ["stations", f"best under {first}", f"best under {second.method}"]
-    head += [f"gain under {second.method} [{findings.unit}]", "methods disagree", "units"]
+    head += [f"gain under {second.method} [{findings.unit}]", "methods disagree", "good under both", "units"]
     caption = (
         f"Gain: how much less its own best set errs under {second.method} than the set that {first} chose, paired over "
-        "units. The methods disagree where the gain is significant."
+        "units. The methods disagree where the gain is significant. Good under both: tied with the best set under "
+        f"{first}, and not significantly worse than any under {second.method}."
     )
     where = "The best sets of either method, where they disagree significantly."
     table = DataTable(head, rows, caption=caption, label="second method")

@@ -369,5 +369,6 @@ def _unknown_stations(findings: PlacementFindings) -> list[str]:
         sets += [findings.advice.best.stations, *findings.advice.ties]
     if findings.second:
         sets += [stations for one in findings.second.choices for stations in (one.chosen, one.best)]
+        sets += [one.shared.stations for one in findings.second.choices if one.shared]
     sets += [*findings.compared, *((contribution.candidate,) for contribution in findings.contributions)]
     return sorted({name for stations in sets for name in stations} - known)

@@ -1,7 +1,7 @@
 """The answer to a question: sizes compared on held-out units, the advised set, and what a second method says."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -48,8 +48,7 @@ def advise(
     at = next(at for at, stations in enumerate(levels) if stations not in beaten)
     stations, last = levels[at], len(levels) - 1
     own = races[len(stations)]
-    rows = own.ranking("").rows
-    ties = tuple(row.stations for row in rows[1:] if row.tied) if stations == own.best else ()
+    ties = own.ties if stations == own.best else ()
     why: Literal["only", "smallest", "between", "largest"]
     why = "only" if not last else "smallest" if at == 0 else "largest" if at == last else "between"
     return PlacementAdvice(errors[stations], why, ties, len(own.sets))
@@ -83,21 +82,30 @@ def set_error(stations: StationNames, errors: Costs, cost: float | None = None) 
     return SetError(stations, float(values.mean()), low, high, len(values), cost)
 
 
-def compare_second(chosen: StationNames, costs: Mapping[StationNames, Costs]) -> SecondChoice | None:
-    """What the costs of some sets under a second method say of the chosen one; None where it was not measured."""
+def compare_second(
+    chosen: StationNames, costs: Mapping[StationNames, Costs], ties: Collection[StationNames] = ()
+) -> SecondChoice | None:
+    """What the costs of some sets under a second method say of the chosen one; None where it was not measured.
+
+    `ties` are the sets that are tied with the chosen one under the first method.
+    """
     complete, _ = complete_sets(costs)
     if chosen not in complete:
         return None
     order = sort_by_cost(complete)
-    others = [names for names in order if names != chosen]
-    gaps = {names: compare_paired(complete[chosen], complete[names]) for names in others}
-    own = complete[chosen]
-    p = holm([sign_flip_p(np.array([own[unit] - complete[names][unit] for unit in own])) for names in others])
-    worse = any(
-        corrected <= SIGNIFICANCE and (gaps[names].low or 0.0) > 0.0 for names, corrected in zip(others, p, strict=True)
-    )
-    units = len(own)
     if order[0] == chosen:
-        return SecondChoice(chosen, chosen, 0.0, of=len(order), units=units)
-    gap = gaps[order[0]]
-    return SecondChoice(chosen, order[0], gap.mean, gap.low, gap.high, worse, len(order), units)
+        return SecondChoice(chosen, chosen, 0.0, of=len(order), units=len(complete[chosen]))
+    gap, worse = compare_paired(complete[chosen], complete[order[0]]), _is_beaten(chosen, complete)
+    better = order[: order.index(chosen)] if worse else []
+    shared = next((SetError(names) for names in better if names in ties and not _is_beaten(names, complete)), None)
+    return SecondChoice(
+        *(chosen, order[0], gap.mean, gap.low, gap.high, worse, len(order), len(complete[chosen])), shared=shared
+    )
+
+
+def _is_beaten(names: StationNames, costs: Mapping[StationNames, Mapping[str, float]]) -> bool:
+    """Whether a set is significantly worse than another one: sign flips over units, corrected for all others (Holm)."""
+    own, others = costs[names], [costs[other] for other in costs if other != names]
+    p = holm([sign_flip_p(np.array([own[unit] - other[unit] for unit in own])) for other in others])
+    lows = [compare_paired(own, other).low or 0.0 for other in others]
+    return any(corrected <= SIGNIFICANCE and low > 0.0 for corrected, low in zip(p, lows, strict=True))

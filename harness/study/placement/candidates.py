@@ -27,7 +27,7 @@ from harness.core.humanoid24 import standard_skeleton
 from harness.core.ranges import Name, Range
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, HarnessError
-from harness.results.findings import CandidatePlace
+from harness.results.findings import CandidatePlace, StationNames
 
 Pair = Literal["", "each", "together"]
 CandidateGroup = tuple[CandidatePlace, ...]
@@ -169,6 +169,11 @@ def station_set(units: Iterable[CandidateGroup], order: Sequence[CandidateGroup]
     """The places of some units without duplicates, in the order of the candidates."""
     selected = set(itertools.chain.from_iterable(units))
     return tuple(place for unit in order for place in unit if place in selected)
+
+
+def names_of_places(stations: StationSet) -> StationNames:
+    """Names of the places of a set."""
+    return tuple(place.name for place in stations)
 
 
 def select_groups(names: Sequence[str], units: Sequence[CandidateGroup], where: str) -> tuple[CandidateGroup, ...]:

@@ -4,6 +4,7 @@ A cell of five seconds takes 0.15 to 0.4 s of an otherwise idle core with `exper
 the first cell of a clip about a second more. A usual question is three of eight places for one behaviour, 56 sets.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -22,6 +23,23 @@ class Budget:
     """Most cells on which sets are chosen; the held-out clips and the second method come on top."""
     minutes: float
     """About how long all of it takes on two quiet cores [min]."""
+
+
+@dataclass(frozen=True)
+class CellForecast:
+    """About how many cells a question takes."""
+
+    choose: int
+    """Cells on which sets are chosen."""
+    test: int
+    """Cells of the chosen sets on held-out clips."""
+    repeat: int
+    """Cells of the second method."""
+
+    @property
+    def total(self) -> int:
+        """All of them."""
+        return self.choose + self.test + self.repeat
 
 
 EFFORTS: Mapping[Effort, Budget] = {
@@ -64,11 +82,22 @@ def _double(first: int, most: int) -> tuple[int, ...]:
 
 def count_cells(sets: Sequence[int], ladder: Sequence[int], clips: int) -> int:
     """The most cells that the rounds of a search by halves use."""
-    left, cells, before = list(sets), 0, 0
+    used, _ = last_round(sets, ladder, clips, math.inf)
+    return used
+
+
+def last_round(sets: Sequence[int], ladder: Sequence[int], clips: int, cells: float) -> tuple[int, int]:
+    """The cells that a search by halves uses where no set is significantly worse, and the units of its last round.
+
+    No round after the first is begun for which `cells` do not suffice.
+    """
+    left, used, before = list(sets), 0, 0
     for units in ladder:
-        cells += sum(left) * (units - before) * clips
-        left, before = [keep_count(count) for count in left], units
-    return cells
+        needed = sum(left) * (units - before) * clips
+        if before and used + needed > cells:
+            break
+        left, used, before = [keep_count(count) for count in left], used + needed, units
+    return used, before
 
 
 def keep_count(sets: int) -> int:

@@ -17,10 +17,9 @@ import numpy as np
 from harness.compare import MIN_UNITS, SIGNIFICANCE, compare_paired, holm, sign_flip_p
 from harness.results.findings import RankedSet, Ranking, StationNames
 from harness.results.findings.advice import HalvingRound
-from harness.study.placement.candidates import CandidateGroup, StationSet, station_set
+from harness.study.placement.candidates import CandidateGroup, StationSet, names_of_places, station_set
 from harness.study.placement.effort import keep_count, plan_rounds
 from harness.study.placement.ranking import Costs, complete_sets, rank_sets, sort_by_cost
-from harness.study.placement.search import names_of_places
 
 MeasureUnits = Callable[[Sequence[StationSet], int], Mapping[StationSet, Costs]]
 """Measures sets on the first so many units: set -> unit -> cost."""
@@ -60,6 +59,11 @@ class Race:
     def best(self) -> StationNames:
         """The best set; () if none was measured."""
         return next(iter(sort_by_cost(self.finalists)), ())
+
+    @property
+    def ties(self) -> tuple[StationNames, ...]:
+        """Finalists beside the best set that are not significantly worse than it, the best first."""
+        return tuple(row.stations for row in rank_sets("halve", "", self.finalists).rows[1:] if row.tied)
 
     def ranking(self, title: str) -> Ranking:
         """All sets, best first: the finalists with their ties, then those that were left out, the last one first."""

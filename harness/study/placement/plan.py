@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from harness.compare import margin_of
+from harness.core.files import content_key
 from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment import check_names
@@ -18,7 +19,7 @@ from harness.results import current_circumstances
 from harness.results.findings import CandidatePlace, PlacementFindings
 from harness.score import DEFINITIONS
 from harness.study.placement import search
-from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
+from harness.study.placement.candidates import CandidateGroup, StationSet, names_of_places, select_groups, station_set
 from harness.study.placement.config import (
     PlacementStudy,
     base_scenario,
@@ -27,7 +28,6 @@ from harness.study.placement.config import (
 )
 from harness.study.placement.ranking import Costs, sets_of_claim
 from harness.study.placement.refinement import check_unit_count
-from harness.study.placement.search import names_of_places
 from harness.study.placement.set_results import SetRequest, clips_of_units, link_rate_hz
 
 
@@ -56,6 +56,11 @@ class PlacementPlan:
     def cost_sign(self) -> float:
         """Factor between errors and costs, for which lower is better: 1 or -1."""
         return 1.0 if margin_of(self.study.metric).rise_is_worse else -1.0
+
+    @property
+    def unit(self) -> str:
+        """The unit of the metric."""
+        return DEFINITIONS[self.study.metric].unit
 
     @property
     def places(self) -> tuple[CandidatePlace, ...]:
@@ -142,7 +147,7 @@ class PlacementPlan:
             name=study.name,
             title=study.title,
             metric=study.metric,
-            unit=DEFINITIONS[study.metric].unit,
+            unit=self.unit,
             motion=self.motion,
             behaviours=tuple(dict.fromkeys(scenario.motion.behaviours)),
             methods=scenario.methods,
@@ -178,6 +183,7 @@ def plan_study(study: PlacementStudy, load: Callable[[str], Scenario], folder: L
     """Plan a study whose scenarios `load` gives by name; BadInput, UnknownName."""
     scenario = expand_clips(base_scenario(study, load), folder)
     conditions = {c.name: expand_clips(base_scenario(study, load, c), folder) for c in study.condition}
+    conditions = {name: _name_by_places(condition, scenario) for name, condition in conditions.items()}
     source = open_scenario_motion(scenario.motion, folder, scenario.seed)
     held_out = _held_out_scenario(study, scenario, source)
     plan = PlacementPlan(study, study.groups(), scenario, held_out, conditions, source.title, folder)
@@ -192,6 +198,13 @@ def plan_study(study: PlacementStudy, load: Callable[[str], Scenario], folder: L
     for size in {*(len(stations) for stations in plan.known_sets()), *study.sizes}:
         plan.rate_hz(size)
     return plan
+
+
+def _name_by_places(condition: Scenario, own: Scenario) -> Scenario:
+    """A condition with a name of its own where it moves stations: the name of a cell leaves their places out."""
+    if condition.stations == own.stations:
+        return condition
+    return replace(condition, name=f"{condition.name}_{content_key(condition.content()['stations'])[:8]}")
 
 
 def _held_out_scenario(study: PlacementStudy, scenario: Scenario, source: MotionSource) -> Scenario | None:

@@ -44,8 +44,8 @@ def estimate_power(
     units: int,
     sets: int,
     unit: str,
-    cell_s: float | None,
-    duration_s: Callable[[int], float | None],
+    cell_s: float | None = None,
+    duration_s: Callable[[int], float | None] = lambda units: None,
 ) -> StatisticalPower:
     """The power of a study with `units` units that compares `sets` sets, from the costs of its pilot.
 

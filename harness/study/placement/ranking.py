@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,6 +39,8 @@ from harness.study.placement.config import PublishedClaim
 
 Costs = Mapping[str, float | None]
 """Unit of statistics -> cost (see `compare.units`); None where it was not measured."""
+Measure = Callable[[Sequence[StationSet]], Mapping[StationSet, Costs]]
+"""Measures sets: set -> unit of statistics -> cost."""
 _RESAMPLES = 2000
 _MOST_TESTED_SETS = 24
 """Most sets whose changes of order are tested: the correction for all pairs of more would leave nothing significant."""

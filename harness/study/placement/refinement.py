@@ -14,10 +14,9 @@ from harness.compare import SIGNIFICANCE, compare_paired, count_needed, holm, si
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
 from harness.results.findings import CandidatePlace, PlacementSearch, SearchStep
-from harness.study.placement.candidates import StationSet, mirror_place, placement_fault, station_name
+from harness.study.placement.candidates import StationSet, mirror_place, names_of_places, placement_fault, station_name
 from harness.study.placement.config import RefineOptions
-from harness.study.placement.ranking import complete_sets, join_names, sort_by_cost
-from harness.study.placement.search import Measure, names_of_places
+from harness.study.placement.ranking import Measure, complete_sets, join_names, sort_by_cost
 
 MoveGroup = tuple[int, ...]
 """Indices of the places of a set that move together."""

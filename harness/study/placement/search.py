@@ -5,7 +5,7 @@ function caches them. Costs are errors, with the opposite sign where high values
 """
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -13,7 +13,13 @@ import numpy as np
 from harness.compare import PairedDifference, compare_paired
 from harness.errors import BadInput
 from harness.results.findings import MarginalContribution, PlacementSearch, Ranking, SearchStep, StationNames
-from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
+from harness.study.placement.candidates import (
+    CandidateGroup,
+    StationSet,
+    names_of_places,
+    select_groups,
+    station_set,
+)
 from harness.study.placement.config import (
     AblateOptions,
     AddOptions,
@@ -21,11 +27,7 @@ from harness.study.placement.config import (
     GreedyOptions,
     check_station_count,
 )
-from harness.study.placement.ranking import Costs, complete_sets, join_names, rank_sets, sort_by_cost
-
-Measure = Callable[[Sequence[StationSet]], Mapping[StationSet, Costs]]
-"""Measures sets: set -> unit of statistics -> cost."""
-
+from harness.study.placement.ranking import Costs, Measure, complete_sets, join_names, rank_sets, sort_by_cost
 
 ModeResult = tuple[tuple[Ranking, ...], tuple[MarginalContribution, ...]]
 """Rankings and contributions that a mode found."""
@@ -197,11 +199,6 @@ def best_measured_set(size: int, costs: Mapping[StationSet, Costs]) -> StationSe
     if not complete:
         raise BadInput(f"refine: no set of {size} stations was measured.", "Name it in refine.set.")
     return same_size[sort_by_cost(complete)[0]]
-
-
-def names_of_places(stations: StationSet) -> StationNames:
-    """Names of the places of a set."""
-    return tuple(place.name for place in stations)
 
 
 def _measured_costs(costs: Costs) -> Costs:

@@ -1,8 +1,8 @@
 """Cells of sets of stations: each set is run once and cached in the folder of the study.
 
 A set is a variant of the scenario with other stations, so that motion and fitted methods are shared. Where the serial
-line limits the rate, the set also has a rate of its own. The key of a cell contains the places of all stations. So no
-set is run twice, in whichever mode, in this run or a later one.
+line limits the rate, the set also has a rate of its own. The key of a cell contains the places of the set's stations,
+and no other candidates. So no set is run twice, in whichever mode, in this run or a later one.
 """
 
 import json
@@ -182,12 +182,12 @@ class SetResults:
 def _name_by_content(asked: Scenario, rate_hz: float, worn: tuple[str, ...] = ()) -> Scenario:
     """The scenario at a rate, with a name that is unique by content.
 
-    Test clips are no part of it, and so no part of the key of a cell: a set on a clip is one cell, with whichever other
-    clips it is asked for.
+    Test clips and candidates are no part of it, and so no part of the key of a cell: a set on a clip is one cell, with
+    whichever other clips and candidates it is asked for. The places of its own stations are among its conditions.
     """
     scenario = replace(asked, tracker=replace(asked.tracker, rate_hz=rate_hz), vary={}, worn=worn or asked.worn)
     content = scenario.content()
-    del content["motion"]["test"], content["motion"]["behaviours"]
+    del content["motion"]["test"], content["motion"]["behaviours"], content["stations"]
     return replace(scenario, name=f"{scenario.name}_{content_key(content)[:8]}")
 
 

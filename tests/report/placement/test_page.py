@@ -16,13 +16,15 @@ from harness.compare import compare_paired
 from harness.core.number_format import Interval
 from harness.report.kit.page import Drawing
 from harness.report.kit.style import Chart
+from harness.report.placement.answer import placement_sentence
 from harness.report.placement.body_map import PALE, body_map
 from harness.report.placement.charts import pareto_chart
 from harness.report.placement.contribution_significance import significant_candidates
 from harness.report.placement.error_curve import curve_points, error_curve
 from harness.report.placement.page import placement_text, write_placement_page
 from harness.report.placement.set_bodies import tied_sets_blocks
-from harness.report.placement.wording import placement_sentence, plain_name, set_name, smallest_sufficient_set
+from harness.report.placement.study_answer import smallest_sufficient_set
+from harness.report.placement.wording import plain_name, set_name
 from harness.results.findings import (
     BestSet,
     MarginalContribution,
@@ -292,12 +294,25 @@ def test_where_two_methods_disagree_the_page_begins_with_it(
     content = write_placement_page(tmp_path).read_text(encoding="utf-8")
     assert (content.index('aria-label="second method"') < content.index("<nav")) is worse
     assert (tmp_path / "plots" / "second_method.svg").exists() is worse
-    assert ("<h1>Methods disagree: " in content) is worse
+    assert ("<h1>None of 3 places is good under both" in content) is worse
     assert ("<h1>Wear one station for walking: pelvis" in content) is not worse
-    assert "Wear one station for walking: pelvis" in text_of(tmp_path / "report.html")
     text = placement_text(findings)
     row = next(line for line in text.splitlines() if "+1.25 (+0.50 to +2.00)" in line)
-    assert re.match(r"1 +pelvis +right hand .*" + ("yes" if worse else "no"), row)
+    assert re.match(r"1 +pelvis +right hand .*" + ("yes +none" if worse else "no"), row)
+
+
+def test_the_body_wears_what_is_good_under_both_methods(placement: PlacementFindings, tmp_path: Path) -> None:
+    own = SetError(("left_hand",), 3.1, 2.0, 4.0, 16)
+    choice = SecondChoice(("pelvis",), ("left_hand",), 1.25, 0.5, 2.0, worse=True, of=3, units=16, shared=own)
+    advice = PlacementAdvice(SetError(("pelvis",), 3.0, 2.0, 4.0, 16), "smallest", (("left_hand",),), of=3)
+    write_placement(
+        tmp_path / "findings.json", replace(placement, second=SecondMethod("ridge", (choice,)), advice=advice)
+    )
+    content = write_placement_page(tmp_path).read_text(encoding="utf-8")
+    assert re.search("<h1>Wear [^<]*left hand, good under both methods", content)
+    assert "The body with the recommended stations left hand" in content
+    text = text_of(tmp_path / "report.html")
+    assert re.search(r"yes\s+left hand\s+16", text)
 
 
 def test_without_held_out_clips_the_cross_validated_error_is_beside_the_error(placement: PlacementFindings) -> None:

@@ -39,13 +39,28 @@ class NoStation(OneStation):
         return Fitted(tpose(body.skeleton), "")
 
 
+@dataclass(frozen=True)
+class Bent(OneStation):
+    """The T-pose as `OneStation` turns it; without a tracker on the pelvis every hinge is bent by half a radian."""
+
+    name: str = "bent"
+    summary: str = "bends without the pelvis"
+
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "Fitted":
+        return Fitted(tpose(body.skeleton), bend_rad=0.5)
+
+
 @dataclass(frozen=True, eq=False)
 class Fitted:
     qpos: Floats
     needed: str = NEEDED
+    bend_rad: float = 0.0
+    """Rotation of every hinge where the needed station is not worn [rad]."""
 
     def begin(self, calibration: Calibration) -> "Session":
-        return Session(self.qpos, calibration, self.needed)
+        bent = np.array(self.qpos)
+        bent[7:] += 0.0 if self.needed in calibration.stations else self.bend_rad
+        return Session(bent, calibration, self.needed)
 
 
 class Session:

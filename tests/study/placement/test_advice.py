@@ -91,6 +91,7 @@ def test_a_second_method_disagrees_only_if_its_own_best_set_is_significantly_bet
     assert apart is not None
     assert (apart.worse, apart.best, apart.of, apart.units) == (True, TWO, 3, 32)
     assert apart.difference == pytest.approx(1.0, abs=0.15)
+    assert apart.shared is None
     near = compare_second(ONE, errors({ONE: 4.01, TWO: 4.0}, spread=1.0))
     assert near is not None
     assert not near.worse
@@ -98,3 +99,19 @@ def test_a_second_method_disagrees_only_if_its_own_best_set_is_significantly_bet
     assert own is not None
     assert (own.best, own.difference, own.worse) == (TWO, 0.0, False)
     assert compare_second(ONE, {ONE: {"performer 1": None}}) is None
+
+
+def test_a_set_is_good_under_both_methods_if_it_is_tied_under_the_first_and_not_worse_under_the_second() -> None:
+    """Of two ties the better one under the second method, even if another set is the best there by chance."""
+    under_second = errors({ONE: 5.0, TWO: 4.01, THREE: 4.0, ("c3",): 4.5})
+    ties = [("c3",), TWO]
+    shared = compare_second(ONE, under_second, ties)
+    assert shared is not None
+    assert (shared.best, shared.worse, shared.shared) == (THREE, True, SetError(TWO))
+    for nobody in ([("c3",)], [], [ONE]):  # worse than two others; no ties
+        choice = compare_second(ONE, under_second, nobody)
+        assert choice is not None
+        assert choice.shared is None
+    near = compare_second(ONE, errors({ONE: 4.01, TWO: 4.0}, spread=1.0), [TWO])
+    assert near is not None
+    assert (near.worse, near.shared) == (False, None)

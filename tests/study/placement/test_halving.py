@@ -7,19 +7,19 @@ import pytest
 from harness.compare import compare_paired
 from harness.core.seeds import generator
 from harness.results.findings import StationNames
-from harness.study.placement.candidates import Candidate, StationSet, make_candidate_groups
+from harness.study.placement.candidates import Candidate, StationSet, make_candidate_groups, names_of_places
 from harness.study.placement.effort import (
     EFFORTS,
     FINALISTS,
     count_cells,
     effort_within,
     keep_count,
+    last_round,
     plan_rounds,
 )
 from harness.study.placement.halving import Race, SearchLimits, add_stations, race_all
 from harness.study.placement.question import count_sets, list_sets
 from harness.study.placement.ranking import Costs
-from harness.study.placement.search import names_of_places
 
 PLACES = make_candidate_groups(
     [
@@ -118,6 +118,11 @@ def test_no_round_begins_for_which_the_cells_do_not_suffice() -> None:
     assert len(measure.cells) <= 120
     assert found.rounds[-1].kept == found.rounds[-1].sets  # nothing is left out without a further round
     assert found.rounds[-1].units < 48
+    alike = Performers(spread=9.0)  # nothing is significantly worse, as the forecast supposes
+    found = race(3, alike, limits(120))
+    ladder = plan_rounds([56], 48, 1, 120)
+    assert last_round([56], ladder, 1, 120) == (len(alike.cells), found.rounds[-1].units)
+    assert last_round([56], ladder, 1, 10) == (56, 1)  # the first round is always there
 
 
 def test_a_set_that_is_not_measured_on_every_unit_is_left_out() -> None:

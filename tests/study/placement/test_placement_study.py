@@ -197,6 +197,18 @@ def test_conditions_rank_the_same_sets(done: tuple[Path, Path, PlacementFindings
     assert len(findings.agreements) == 1
 
 
+def test_a_condition_that_moves_a_station_has_cells_of_its_own(tmp_path: Path) -> None:
+    """The one station that is read is moved with its true mount known, so that the error stays; the cells do not."""
+    moved = '[[condition]]\nname = "higher"\nchanges = { stations = { pelvis = { around_deg = 90.0 } } }'
+    study = STUDY.replace("metric =", "condition_size = 1\nmetric =")
+    findings, outcome = run_placement(written(tmp_path, "[exhaustive]\nmost = 1", moved, study=study), tmp_path / "out")
+    assert outcome is Outcome.PASS
+    assert [condition.name for condition in findings.conditions][1:] == ["higher"]
+    cells = [json.loads((cell / "cell.json").read_text()) for cell in (tmp_path / "out" / "cells").iterdir()]
+    places = [cell["defined_by"]["stations"]["pelvis"] for cell in cells if cell["stations"] == ["pelvis"]]
+    assert sorted(place["around_deg"] for place in places) == [90.0, 90.0, 165.0, 165.0]
+
+
 def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
     changes = (
         '[exhaustive]\nmost = 1\n[changes.components]\nmount_slip = [{ station = "pelvis" }]'  # nobody else has it

@@ -9,7 +9,7 @@ from harness.compare import count_needed
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.results.findings import BenchmarkStatement, StationNames
-from harness.study.placement.candidates import Candidate, make_candidate_groups
+from harness.study.placement.candidates import Candidate, make_candidate_groups, names_of_places
 from harness.study.placement.config import PublishedClaim
 from harness.study.placement.ranking import (
     ConditionCosts,
@@ -30,7 +30,6 @@ from harness.study.placement.ranking import (
     sort_by_cost,
     summarise_set,
 )
-from harness.study.placement.search import names_of_places
 
 CLIPS = tuple(f"clip_{n:02}" for n in range(12))
 Sets = dict[StationNames, dict[str, float | None]]

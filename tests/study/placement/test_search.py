@@ -13,6 +13,7 @@ from harness.study.placement.candidates import (
     StationSet,
     make_candidate_groups,
     mirror_place,
+    names_of_places,
     station_set,
 )
 from harness.study.placement.config import AblateOptions, AddOptions, ExhaustiveOptions, GreedyOptions, RefineOptions
@@ -24,7 +25,6 @@ from harness.study.placement.search import (
     best_measured_set,
     check_cell_count,
     exhaustive_sets,
-    names_of_places,
     search_exhaustive,
     search_greedy,
 )

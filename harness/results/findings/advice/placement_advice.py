@@ -74,7 +74,7 @@ class SizeStep:
 
 @dataclass(frozen=True)
 class SecondChoice:
-    """What the second method says of the best set of one size."""
+    """What the second method says of the best set of one size; with costs, of the advised one of its size."""
 
     chosen: Stations
     """The set that the first method chose."""
@@ -90,6 +90,9 @@ class SecondChoice:
     of: int = 1
     """Number of sets that were compared."""
     units: int = 0
+    shared: SetError | None = None
+    """The set to wear where `chosen` is worse: tied with it under the first method, better than it under this one, and
+    significantly worse than none. Its error is that of the first method on held-out units. None if there is none."""
 
 
 @dataclass(frozen=True)
