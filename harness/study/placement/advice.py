@@ -41,11 +41,16 @@ def advise(
     errors: Mapping[StationNames, SetError],
     races: Mapping[int, Race],
 ) -> PlacementAdvice | None:
-    """The first of the sets, the smaller (or cheaper) ones first, than which no later one is better."""
+    """The first of the sets, the smaller (or cheaper) ones first, than which no later one is better.
+
+    A set that errs more than a smaller one is left out, too: a larger set must not be advised for a larger error.
+    """
     if not levels:
         return None
     beaten = {step.smaller for step in steps if step.verdict == "better"}
-    at = next(at for at, stations in enumerate(levels) if stations not in beaten)
+    mean = [np.inf if (error := errors[stations].error) is None else error for stations in levels]
+    possible = [at for at in range(len(levels)) if mean[at] <= min(mean[: at + 1])]
+    at = next(at for at in possible if levels[at] not in beaten)
     stations, last = levels[at], len(levels) - 1
     own = races[len(stations)]
     ties = own.ties if stations == own.best else ()

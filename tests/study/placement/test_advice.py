@@ -6,7 +6,7 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.results.findings import StationNames
-from harness.results.findings.advice import SetError
+from harness.results.findings.advice import SetError, SizeStep
 from harness.study.placement.advice import advise, compare_levels, compare_second, find_front, set_error
 from harness.study.placement.candidates import Candidate, make_candidate_groups
 from harness.study.placement.halving import Race, SearchLimits, race_all
@@ -57,6 +57,15 @@ def test_the_smallest_size_is_advised_than_which_no_larger_one_is_better(
     assert advice is not None
     assert (len(advice.best.stations), advice.why) == (size, why)
     assert (advice.best.units, advice.best.low is not None) == (32, True)
+
+
+def test_a_larger_set_that_errs_more_than_a_smaller_one_is_not_advised() -> None:
+    gaps = ((ONE, TWO, "cannot tell"), (ONE, THREE, "better"), (TWO, THREE, "cannot tell"))
+    steps = [SizeStep(small, large, 0.1, 0.0, 0.2, 0.03, 32, verdict=verdict) for small, large, verdict in gaps]
+    by_name = {names: SetError(names, error, units=32) for names, error in ((ONE, 4.0), (TWO, 4.1), (THREE, 3.8))}
+    advice = advise([ONE, TWO, THREE], steps, by_name, races({1: 4.0, 2: 4.1, 3: 3.8}))
+    assert advice is not None
+    assert advice.best.stations == THREE
 
 
 def test_a_difference_that_a_few_performers_show_is_no_reason_for_more_stations() -> None:
