@@ -53,11 +53,12 @@ def test_a_place_that_cannot_be_written_is_refused_by_the_parser(
     (tmp_path / "text").write_text("hello")
     (tmp_path / "folder").mkdir()
     places = {"text/a": "text is a file, not a folder", "text/a/b": "text is a file", "/proc/a": "cannot be written"}
-    places |= {
+    of_type: dict[object, dict[str, str]] = {
         output_folder: {"text": "text is a file, not a folder"},
         output_file: {"folder": "it is not a file", "/dev/null": "it is not a file"},
         output_link: {"no_folder/a": "there is no folder no_folder"},
-    }[action.type]
+    }
+    places |= of_type[action.type]
     for place, why in places.items():
         with pytest.raises(BadFile) as refused:
             build_parser().parse_args([*verb.split(), action.option_strings[-1], place])

@@ -60,9 +60,12 @@ def test_the_smallest_size_is_advised_than_which_no_larger_one_is_better(
 
 
 def test_a_larger_set_that_errs_more_than_a_smaller_one_is_not_advised() -> None:
-    gaps = ((ONE, TWO, "cannot tell"), (ONE, THREE, "better"), (TWO, THREE, "cannot tell"))
-    steps = [SizeStep(small, large, 0.1, 0.0, 0.2, 0.03, 32, verdict=verdict) for small, large, verdict in gaps]
-    by_name = {names: SetError(names, error, units=32) for names, error in ((ONE, 4.0), (TWO, 4.1), (THREE, 3.8))}
+    steps = [SizeStep(ONE, TWO, -0.1), SizeStep(ONE, THREE, 0.2, verdict="better"), SizeStep(TWO, THREE, 0.3)]
+    by_name: dict[StationNames, SetError] = {
+        ONE: SetError(ONE, 4.0),
+        TWO: SetError(TWO, 4.1),
+        THREE: SetError(THREE, 3.8),
+    }
     advice = advise([ONE, TWO, THREE], steps, by_name, races({1: 4.0, 2: 4.1, 3: 3.8}))
     assert advice is not None
     assert advice.best.stations == THREE
