@@ -41,7 +41,7 @@ _PATTERNS = (
     (rb"\x00", "binary data"),
 )
 """Pattern of the content -> what the file is; the first one that occurs counts."""
-_RESULTS = ("findings.json", "summary.json", "manifest.json", "cells.json", "cell.json", "study.json", "summary.csv")
+_RESULTS = ("findings.json", "summary.json", "manifest.json", "cells.json", "cell.json", "study.json")
 
 
 def toml_kind(content: Mapping[str, Any]) -> str:
@@ -55,13 +55,16 @@ def file_kind(path: Path) -> str:
     """What a file is, such as "a recording"; "" where its first megabyte does not tell, and for what is no file."""
     if not path.is_file():  # a FIFO would wait for ever
         return ""
-    if path.name in _RESULTS:
+    if path.name == "summary.csv":
         return "a file of results"
     try:
         with open(path, "rb") as file:
             data = file.read(MEGABYTE)
         if not data:
             return "an empty file"
+        if path.name in _RESULTS:  # a damaged one is none
+            parsing.parse_json(data.decode("utf-8"))
+            return "a file of results"
         named = next((name for pattern, name in _PATTERNS if re.search(pattern, data)), "")
         return named or toml_kind(parsing.parse_toml(data.decode("utf-8").replace("\r\n", "\n")))
     except (OSError, ValueError):

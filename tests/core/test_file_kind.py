@@ -33,6 +33,14 @@ def test_files_of_each_kind(tmp_path: Path) -> None:
     assert {name: file_kind(tmp_path / name) for name in KINDS} == KINDS
 
 
+def test_a_damaged_file_of_results_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "cell.json"
+    path.write_text('{"schema": 1')
+    assert file_kind(path) == ""
+    path.write_text('{"schema": 1}')
+    assert file_kind(path) == "a file of results"
+
+
 @pytest.mark.parametrize(
     ("content", "kind"),
     [

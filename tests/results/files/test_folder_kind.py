@@ -74,7 +74,9 @@ def test_the_index_tells_a_run_from_a_sweep(tmp_path: Path) -> None:
 
 
 def test_a_file_and_a_missing_folder_are_told_apart(tmp_path: Path) -> None:
-    (tmp_path / "take.rec").touch()
-    for name, found in (("take.rec", "a file, not a folder"), ("nowhere", "no such folder")):
+    (tmp_path / "empty.rec").touch()
+    (tmp_path / "notes.txt").write_text("words")
+    kinds = {"empty.rec": "an empty file", "notes.txt": "a file, not a folder", "nowhere": "no such folder"}
+    for name, found in kinds.items():
         with pytest.raises(BadFile, match=f"{found}; expected a run"):
             require_kind(tmp_path / name, "run")
