@@ -283,7 +283,7 @@ def read_cells_of(out: Path) -> list[Any]:
         ({"scenarios": "[]"}, "no scenarios"),
         ({"schema": "2"}, "schema 2"),
         ({"name": '"../elsewhere"'}, "a plain name"),
-        ({"motion": "{}"}, "`harness run` runs it"),
+        ({"motion": "{}"}, "no key in sweep called 'motion'"),
     ],
 )
 def test_names_that_do_not_exist_are_refused_before_anything_is_written(
