@@ -321,9 +321,14 @@ def test_signals_lie_under_the_time_line_and_lead_to_their_moment(page: Any) -> 
 
 def test_stations_have_their_names_where_they_are(page: Any) -> None:
     name = page.locator(".labels .station")
+    name.wait_for()
     assert name.all_inner_texts() == ["head"]
-    stage, at = page.locator(".stage").bounding_box(), name.bounding_box()
-    assert stage["x"] < at["x"] < stage["x"] + stage["width"]
-    assert stage["y"] < at["y"] < stage["y"] + 0.5 * stage["height"]
+    page.wait_for_function(
+        """() => {
+          const place = (s) => document.querySelector(s).getBoundingClientRect();
+          const stage = place(".stage"), at = place(".labels .station");
+          return stage.x < at.x && at.x < stage.right && stage.y < at.y && at.y < stage.y + 0.5 * stage.height;
+        }"""
+    )
     page.locator("input[name=names]").uncheck()
     page.wait_for_function("!document.querySelector('.labels .station')")
