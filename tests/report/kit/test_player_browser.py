@@ -331,4 +331,4 @@ def test_stations_have_their_names_where_they_are(page: Any) -> None:
         }"""
     )
     page.locator("input[name=names]").uncheck()
-    page.wait_for_function("!document.querySelector('.labels .station')")
+    page.wait_for_function("() => !document.querySelector('.labels .station')")
