@@ -12,7 +12,7 @@ from pathlib import Path
 from harness.bench.limits import hold_to_limit
 from harness.core.calibration import Calibration
 from harness.reconstruct import Reconstructor, Session
-from harness.reconstruct.solver import OutlierGate
+from harness.reconstruct.solver import OutlierGate, SessionReader
 from harness.results.findings import BenchmarkStatement
 from harness.stream import TrackerFrame
 from harness.study.speed import benchmark_clips
@@ -55,6 +55,6 @@ def count_rejected(fitted: Reconstructor, calibration: Calibration, frames: Iter
 def find_gate(session: Session) -> OutlierGate:
     """The outlier gate of a session; that of the final inverse kinematics where a method has one. TypeError if none."""
     for value in vars(session).values():
-        if isinstance(value, OutlierGate):
-            return value
+        if isinstance(value, SessionReader):
+            return value.gate
     raise TypeError(f"{type(session).__name__} has no outlier gate.")

@@ -42,10 +42,17 @@ class FeatureMap(NamedTuple):
     """(F, F) covariance of the errors for positions with a standard deviation of 1 m."""
     orientation: Floats
     """(F, F) covariance of the errors for orientations with a standard deviation of 1 rad."""
+    readings: Floats
+    """(2S, F, F) covariance of the errors for each row of the readings with a standard deviation of 1 m or 1 rad."""
 
-    def error_covariance(self, position_m: float, orientation_rad: float) -> Floats:
-        """(F, F) covariance of the features' errors, for readings with these standard deviations [m], [rad]."""
+    def error_covariance(self, position_m: float, orientation_rad: float, variance: Floats) -> Floats:
+        """(F, F) covariance of the features' errors, for readings with these standard deviations [m], [rad].
+
+        `variance` (2S,) is that of predicted rows [m^2; rad^2].
+        """
         out: Floats = self.fixed + position_m**2 * self.position + orientation_rad**2 * self.orientation
+        for row in np.flatnonzero(variance):
+            out += variance[row] * self.readings[row]
         return out
 
 
@@ -112,7 +119,7 @@ class LocalExperts:
         cross = regression.scatter[np.ix_(known, unknown)]
         rest = regression.scatter[np.ix_(unknown, unknown)] - cross.T @ imputation[:, unknown]
         along = self._directions[unknown]
-        return FeatureMap(out.matrix, out.origin, out.fixed + along.T @ rest @ along, out.position, out.orientation)
+        return out._replace(fixed=out.fixed + along.T @ rest @ along)
 
     def _map(self, matrix: Floats) -> FeatureMap:
         regression, window = self.regression, self.regression.windows
@@ -122,14 +129,15 @@ class LocalExperts:
             start = (POSTURE_SIZE + 3) * age
             posture += regression.options.window_weight * matrix[start : start + POSTURE_SIZE]
         readings = matrix[window.size :].reshape(regression.count, 9, -1)
-        places, axes = readings[:, :3].reshape(-1, matrix.shape[1]), readings[:, 3:].reshape(-1, matrix.shape[1])
+        places, axes = (np.einsum("sif,sig->sfg", rows, rows) for rows in (readings[:, :3], readings[:, 3:]))
         lever = regression.options.lever_m
         return FeatureMap(
             np.ascontiguousarray(matrix),
             regression.mean @ matrix,
             _POSE_ERROR_RAD**2 * posture.T @ posture,
-            places.T @ places,
-            lever**2 * axes.T @ axes,
+            places.sum(axis=0),
+            lever**2 * axes.sum(axis=0),
+            np.concatenate([places, lever**2 * axes]),
         )
 
 

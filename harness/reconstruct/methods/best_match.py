@@ -29,10 +29,10 @@ from harness.errors import BadInput
 from harness.reconstruct.contract import Fitted
 from harness.reconstruct.features.example_features import FeatureWeights
 from harness.reconstruct.features.query_features import LONGEST_GAP_ADVICE, LONGEST_GAP_S
+from harness.reconstruct.features.station_increments import StationIncrements
 from harness.reconstruct.features.virtual_trackers import station_poses
-from harness.reconstruct.solver.outlier_gate import OutlierGate
+from harness.reconstruct.solver.frame_reader import SessionReader
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
 from harness.stream import TrackerFrame
 
 Complexes = NDArray[np.complex128]
@@ -62,17 +62,17 @@ class BestMatch:
         takes = tuple(take for take in examples if len(take) > 1)
         if not takes:
             raise BadInput("The best match needs examples, and there are none.", "Name some in the scenario.")
-        return Fitted(partial(BestMatchSession, body, takes))
+        return Fitted(partial(BestMatchSession, body, takes, StationIncrements(body, takes)))
 
 
 class BestMatchSession:
     """Search among N example frames, with station poses for the mounts of a calibration."""
 
-    def __init__(self, body: Body, takes: Sequence[BodyMotion], calibration: Calibration) -> None:
+    def __init__(
+        self, body: Body, takes: Sequence[BodyMotion], increments: StationIncrements, calibration: Calibration
+    ) -> None:
         self._residuals = Residuals(body, calibration, Loss())
-        clock = DeviceTime()
-        self._monitor = StatusMonitor(clock=clock)
-        self._gate = OutlierGate(len(calibration.stations), _JUMP_M, clock=clock)
+        self._reader = SessionReader(self._residuals, increments.moments(calibration), _JUMP_M)
         self._qpos = np.concatenate([take.qpos for take in takes])
         read = [station_poses(body, take, calibration) for take in takes]
         velocity = [_backward_difference(m) * take.rate_hz for (m, _), take in zip(read, takes, strict=True)]
@@ -84,12 +84,11 @@ class BestMatchSession:
         self._estimate = self._qpos[0]
 
     def step(self, frame: TrackerFrame) -> Estimate:
-        status, any_valid = self._monitor.update(frame)
+        status, any_valid = self._reader.read(frame)
         if any_valid:
-            self._gate.read(frame, self._residuals)
             velocity_m_s, moving = self._velocities(frame)
             self._estimate = self._nearest(velocity_m_s, moving)
-            self._gate.update(self._residuals, self._estimate)
+            self._reader.update(self._estimate)
         return Estimate(self._estimate, status, Origin.MODEL if any_valid else Origin.BRIDGED)
 
     def _velocities(self, frame: TrackerFrame) -> tuple[Floats, Bools]:

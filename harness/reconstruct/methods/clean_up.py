@@ -31,11 +31,11 @@ from harness.core.ranges import Range
 from harness.core.split import declared_training_data
 from harness.reconstruct.contract import Method, Reconstructor, Session
 from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
+from harness.reconstruct.features.station_increments import StationIncrements
+from harness.reconstruct.solver.frame_reader import SessionReader
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
-from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.temporal_alignment import TemporalAlignment, read_frame
 from harness.stream import TrackerFrame
 
 SUFFIX = "+ik"
@@ -80,9 +80,10 @@ class CleanUp:
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedCleanUp":
         inner = self.method.fit(body, examples, rng)
         if not self.needs_examples:
-            return FittedCleanUp(self, body, inner, np.full(48, self.prior_sigma_rad))
+            return FittedCleanUp(self, body, inner, np.full(48, self.prior_sigma_rad), StationIncrements(body, ()))
         hinge_spread_rad = spread_rad(body, examples, mean_posture(body, examples))
-        return FittedCleanUp(self, body, inner, self.spread_share * np.maximum(hinge_spread_rad, _MIN_SPREAD_RAD))
+        sigma_rad = self.spread_share * np.maximum(hinge_spread_rad, _MIN_SPREAD_RAD)
+        return FittedCleanUp(self, body, inner, sigma_rad, StationIncrements(body, examples))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +95,8 @@ class FittedCleanUp:
     inner: Reconstructor
     hinge_sigma_rad: Floats
     """(48,) standard deviations of the prior [rad]."""
+    increments: StationIncrements
+    """How far stations move in a time."""
 
     def begin(self, calibration: Calibration) -> "CleanUpSession":
         return CleanUpSession(self, calibration, self.inner.begin(calibration))
@@ -105,8 +108,8 @@ class CleanUpSession:
     def __init__(self, fitted: FittedCleanUp, calibration: Calibration, inner: Session) -> None:
         self._inner = inner
         self._residuals = Residuals(fitted.body, calibration, fitted.options.loss)
-        self._gate = OutlierGate(len(calibration.stations))
-        self._alignment = TemporalAlignment(len(calibration.stations)) if fitted.options.align else None
+        moments = fitted.increments.moments(calibration)
+        self._reader = SessionReader(self._residuals, moments, align=fitted.options.align)
         self._limits = HingeLimits(fitted.body)
         self._solver = IKSolver(self._residuals, self._limits, fitted.options.stopping)
         self._precision = np.zeros(self._residuals.kinematics.nv)
@@ -119,10 +122,10 @@ class CleanUpSession:
         frame = self._answered_frame(frame, estimate.lag)
         if not (frame.position_valid.any() or frame.orientation_valid.any()):
             return estimate
-        read_frame(frame, self._residuals, self._gate, self._alignment)
+        self._reader.read(frame)
         start = np.concatenate([estimate.qpos[:7], self._limits.clip(self._limits.principal(estimate.qpos[7:]))])
         qpos = self._solver.solve(start, Prior(start, self._precision)).qpos
-        self._gate.update(self._residuals, qpos)
+        self._reader.update(qpos)
         return Estimate(qpos, estimate.status, estimate.origin, estimate.angle_sigma_rad, estimate.lag)
 
     def _answered_frame(self, frame: TrackerFrame, lag: int) -> TrackerFrame:

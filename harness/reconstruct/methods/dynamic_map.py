@@ -223,7 +223,8 @@ class DynamicMapSession(HistorySession):
         options, examples = fitted.options, fitted.examples
         windows = examples.windows
         super().__init__(
-            *(examples.body, calibration, options, examples.mean_prior), *(options.poses, windows.database.rate_hz)
+            *(examples.body, calibration, options, examples.mean_prior, examples.increments.moments),
+            *(options.poses, windows.database.rate_hz),
         )
         self._options, self._windows, self._ik_prior = options, windows, examples.ik_prior
         self._neighbours: NeighbourSearch

@@ -46,9 +46,10 @@ from harness.reconstruct.solver.ground_frame import (
 from harness.reconstruct.solver.history_session import HistorySession
 from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution
+from harness.reconstruct.solver.matrix_algebra import invert_positive_definite
 from harness.reconstruct.solver.root_placement import candidate_placements
 from harness.reconstruct.solver.self_calibration import LossScale, SelfCalibration, posterior
-from harness.reconstruct.solver.subspace import SubspaceSolver, invert_positive_definite
+from harness.reconstruct.solver.subspace import SubspaceSolver
 from harness.reconstruct.solver.subspace_minimiser import Subspace
 from harness.stream import TrackerFrame
 
@@ -148,7 +149,10 @@ class ExpertMapSession(HistorySession):
         options, examples = fitted.options, fitted.examples
         solver_options = SolverOptions(jump_m=options.jump_m, align=options.align)
         loss, rate_hz = solver_options.loss, examples.windows.database.rate_hz
-        super().__init__(examples.body, calibration, solver_options, examples.mean_prior, POSES, rate_hz)
+        super().__init__(
+            *(examples.body, calibration, solver_options, examples.mean_prior, examples.increments.moments),
+            *(POSES, rate_hz),
+        )
         self._options, self._ik_prior, self._made = options, examples.ik_prior, experts
         self._least_sigma_rad = fitted.least_sigma_rad
         self._query = PredictorQuery(regression, self.residuals)
@@ -216,7 +220,8 @@ class ExpertMapSession(HistorySession):
         self._angle_sigma_rad = np.hypot(np.sqrt(found.variance[HINGES]), self._least_sigma_rad)
         if not cold:
             self._scales.update(found)
-            self._loss_scale.update(residuals.targets, residuals.state)
+            if not residuals.variance.any():
+                self._loss_scale.update(residuals.targets, residuals.state)
 
     def _next_ground(self) -> Floats:
         """Ground frame (3,) after the last two, at the same speed."""
@@ -233,7 +238,8 @@ class ExpertMapSession(HistorySession):
         experts, scales = self._experts, self._scales
         predictors = query.predictors(self.past)
         to_z = experts.feature_map(self.residuals.measured, history)
-        noise = to_z.error_covariance(scales.position_sigma_m, scales.orientation_sigma_rad)
+        sigma = scales.position_sigma_m, scales.orientation_sigma_rad
+        noise = to_z.error_covariance(*sigma, self.residuals.variance)
         z = predictors @ to_z.matrix - to_z.origin
         local = local_gaussian(experts.table, z, options.neighbours, options.width)
         mean, covariance = condition(local, z, noise, _RIDGE)

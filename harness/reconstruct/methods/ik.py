@@ -33,6 +33,7 @@ from harness.core.split import EXAMPLES, NONE
 from harness.reconstruct.contract import Fitted
 from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.posture_statistics import mean_posture, scaled_spread_rad
+from harness.reconstruct.features.station_increments import StationIncrements
 from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
 from harness.reconstruct.solver.residuals import Loss
 
@@ -74,7 +75,9 @@ class Ik(SolverOptions):
         return self._fitted(body, database)
 
     def _fitted(self, body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> Fitted[IKSession]:
-        return Fitted(partial(IKSession, body, options=self, posture_prior=self.posture_prior(body, examples)))
+        increments = StationIncrements(body, examples if self.needs_examples else ())
+        prior = self.posture_prior(body, examples)
+        return Fitted(partial(IKSession, body, options=self, posture_prior=prior, moments=increments.moments))
 
     def posture_prior(self, body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> PosturePrior:
         """The prior of the hinges; BadInput when it needs examples and there are none."""

@@ -30,12 +30,12 @@ from harness.core.ranges import Range
 from harness.errors import BadInput
 from harness.reconstruct.contract import CalibrationCache
 from harness.reconstruct.features.posture_statistics import mean_posture
+from harness.reconstruct.features.station_increments import StationIncrements
 from harness.reconstruct.features.virtual_trackers import station_poses
+from harness.reconstruct.solver.frame_reader import SessionReader
 from harness.reconstruct.solver.ground_frame import MIN_HEADING_EXPLAINED, HeadingEstimator, anchor_of, ground_from_qpos
-from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
-from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
 from harness.stream import TrackerFrame
 
 _JUMP_M = 0.3
@@ -69,7 +69,8 @@ class KernelRidge:
         if frames < 2:
             raise BadInput("Kernel ridge regression needs examples, and there are none.", "Name some in the scenario.")
         kept = np.sort(rng.permutation(frames)[: self.most_frames])
-        return FittedKernelRidge(self, body, tuple(examples), kept, rng.standard_normal((len(kept), 12, 6)))
+        noise, increments = rng.standard_normal((len(kept), 12, 6)), StationIncrements(body, tuple(examples))
+        return FittedKernelRidge(self, body, tuple(examples), kept, noise, increments)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +85,8 @@ class FittedKernelRidge:
     noise: Floats
     """(N, 12, 6) standard normal, for the readings of up to twelve stations."""
 
+    increments: StationIncrements
+    """How far stations move in a time."""
     maps: "CalibrationCache[ReadingMaps]" = field(default_factory=CalibrationCache, repr=False)
     """Maps of the last calibration, shared by sessions of one performer."""
 
@@ -171,17 +174,15 @@ class KernelRidgeSession:
     def __init__(self, fitted: FittedKernelRidge, calibration: Calibration) -> None:
         count = len(calibration.stations)
         self._residuals = Residuals(fitted.body, calibration, Loss())
-        clock = DeviceTime()
-        self._monitor, self._gate = StatusMonitor(clock=clock), OutlierGate(count, _JUMP_M, clock=clock)
+        self._reader = SessionReader(self._residuals, fitted.increments.moments(calibration), _JUMP_M)
         self._maps = fitted.maps.get(calibration, lambda: ReadingMaps(fitted, calibration))
         self._estimate = self._maps.mean_qpos
         self._measured_before = np.zeros(2 * count, bool)
         """(2 S,) positions, then orientations, that this session has had. The others take no part in the map."""
 
     def step(self, frame: TrackerFrame) -> Estimate:
-        status, any_valid = self._monitor.update(frame)
+        status, any_valid = self._reader.read(frame)
         if any_valid:
-            self._gate.read(frame, self._residuals)
             self._measured_before |= self._residuals.measured
             learnt = self._maps.learnt(self._measured_before)
             position_m, turned = self._residuals.target_m, self._residuals.world_from_target
@@ -192,7 +193,7 @@ class KernelRidgeSession:
             qpos[7:] += learnt.angles(inputs)[0]
             qpos[:7] = self._estimate[:7]
             self._estimate = place_root(self._residuals, qpos)
-            self._gate.update(self._residuals, self._estimate)
+            self._reader.update(self._estimate)
         return Estimate(self._estimate, status, Origin.MODEL if any_valid else Origin.BRIDGED)
 
 

@@ -143,7 +143,8 @@ class LocalPcaSession(HistorySession):
     def __init__(self, fitted: FittedLocalPca, calibration: Calibration) -> None:
         options, examples = fitted.options, fitted.examples
         super().__init__(
-            *(examples.body, calibration, options, examples.mean_prior), *(_HISTORY, examples.windows.database.rate_hz)
+            *(examples.body, calibration, options, examples.mean_prior, examples.increments.moments),
+            *(_HISTORY, examples.windows.database.rate_hz),
         )
         self._options, self._windows, self._ik_prior = options, examples.windows, examples.ik_prior
         self._subspace_solver = SubspaceSolver(self.residuals, self.limits, options.stopping)

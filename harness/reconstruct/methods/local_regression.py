@@ -39,16 +39,16 @@ from harness.reconstruct.features.example_features import ExampleFeatures, Featu
 from harness.reconstruct.features.pose_space import HingeAngles, JointQuaternions, PoseSpace
 from harness.reconstruct.features.posture_statistics import mean_posture, scaled_spread_rad
 from harness.reconstruct.features.query_features import LONGEST_GAP_ADVICE, LONGEST_GAP_S, QueryFeatures
+from harness.reconstruct.features.station_increments import StationIncrements
 from harness.reconstruct.methods.window_method import DatabaseLearner
+from harness.reconstruct.solver.frame_reader import SessionReader
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, qpos_from_posture, step_ground
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.limb_solver import LimbSolver
-from harness.reconstruct.solver.outlier_gate import JUMP_M, OutlierGate
+from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
-from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
-from harness.reconstruct.solver.temporal_alignment import TemporalAlignment, read_frame
 from harness.stream import TrackerFrame
 
 _MIN_SPREAD_RAD = math.radians(1.0)
@@ -108,7 +108,7 @@ class LocalRegression(DatabaseLearner["FittedLocalRegression"]):
         if self.spread:
             centre = mean_posture(body, database)
             sigma_rad = scaled_spread_rad(body, database, centre, _HINGE_SIGMA_RAD, _MIN_SPREAD_RAD)
-        return FittedLocalRegression(self, body, database, sigma_rad)
+        return FittedLocalRegression(self, body, database, sigma_rad, StationIncrements(body, database))
 
     @abstractmethod
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
@@ -124,6 +124,8 @@ class FittedLocalRegression:
     database: MotionDatabase
     hinge_sigma_rad: Floats
     """(48,) standard deviations of the prior [rad]."""
+    increments: StationIncrements
+    """How far stations move in a time."""
     cache: CalibrationCache[ExampleFeatures] = field(default_factory=CalibrationCache, repr=False)
 
     def begin(self, calibration: Calibration) -> "LocalRegressionSession":
@@ -148,13 +150,11 @@ class LocalRegressionSession:
         options = self._options = fitted.options
         self._residuals = Residuals(fitted.body, calibration, Loss())
         jump_m = options.jump_m if options.final_ik else max(options.jump_m, _JUMP_WITHOUT_IK_M)
-        self._alignment = TemporalAlignment(len(calibration.stations)) if options.align else None
-        clock = DeviceTime()
-        self._monitor = StatusMonitor(clock=clock)
-        self._gate = OutlierGate(len(calibration.stations), jump_m, clock=clock)
+        moments = fitted.increments.moments(calibration)
+        self._reader = SessionReader(self._residuals, moments, jump_m, align=options.align)
         self._examples = fitted.example_features(calibration)
         self._lookup = self._examples.index.begin_search()
-        self._features = QueryFeatures(self._residuals, calibration, self._examples, clock)
+        self._features = QueryFeatures(self._residuals, calibration, self._examples, self._reader.clock)
         self._limits = HingeLimits(fitted.body)
         self._space: PoseSpace = HingeAngles()
         if options.outputs == "quaternions":
@@ -168,11 +168,10 @@ class LocalRegressionSession:
         self._last_poses: list[Floats] = []
 
     def step(self, frame: TrackerFrame) -> Estimate:
-        status, any_valid = self._monitor.update(frame)
+        status, any_valid = self._reader.read(frame)
         if not any_valid:
             self._last_rows, self._last_poses = _NO_ROWS, []
             return Estimate(self._estimate, status, Origin.BRIDGED)
-        read_frame(frame, self._residuals, self._gate, self._alignment)
         if not np.count_nonzero(self._residuals.measured):
             return Estimate(self._estimate, status, Origin.BRIDGED)
         query = self._features.compute(frame, self._estimate)
@@ -180,7 +179,7 @@ class LocalRegressionSession:
         self._estimate = self._fit_to_trackers(
             qpos_from_posture(pose[:POSTURE_SIZE], step_ground(np.array(query.view), pose[POSTURE_SIZE:]))
         )
-        self._gate.update(self._residuals, self._estimate)
+        self._reader.update(self._estimate)
         return Estimate(self._estimate, status)
 
     def _regress(self, query: Query) -> Floats:

@@ -14,6 +14,7 @@ from harness.reconstruct.contract import Reconstructor
 from harness.reconstruct.database.frames import Windows
 from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.posture_statistics import mean_posture
+from harness.reconstruct.features.station_increments import StationIncrements
 from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior
 
@@ -30,13 +31,16 @@ class WindowExamples:
     """Prior about the mean posture, for frames without a history."""
     ik_prior: PosturePrior
     """Prior of `ik`."""
+    increments: StationIncrements
+    """How far stations move in a time."""
 
     @classmethod
     def learn(cls, body: Body, database: MotionDatabase, poses: int) -> "WindowExamples":
         """Windows of so many poses."""
         mean_prior = PosturePrior(mean_posture(body, database), np.full(48, POSTURE_PRIOR_SIGMA_RAD))
         windows = database.windows(poses, with_successor=True)
-        return cls(body, windows, mean_prior, Ik().posture_prior(body, database))
+        increments = StationIncrements(body, database)
+        return cls(body, windows, mean_prior, Ik().posture_prior(body, database), increments)
 
 
 class DatabaseLearner(ABC, Generic[R]):

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
+    from harness.reconstruct.solver.frame_reader import SessionReader
     from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
     from harness.reconstruct.solver.hinge_limits import HingeLimits
     from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
@@ -22,6 +23,7 @@ __all__ = [
     "OutlierGate",
     "Prior",
     "Residuals",
+    "SessionReader",
     "StatusMonitor",
     "Stopping",
 ]

@@ -14,6 +14,7 @@ from harness.core.estimate import Origin
 from harness.reconstruct.solver.ground_frame import ground_from_qpos, posture_from_qpos
 from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution
+from harness.reconstruct.solver.reading_prediction import LearnMoments
 from harness.reconstruct.solver.subspace import SubspaceSolver
 from harness.reconstruct.solver.subspace_minimiser import Subspace
 from harness.stream import TrackerFrame
@@ -35,10 +36,11 @@ class HistorySession(IKSession, ABC):
         calibration: Calibration,
         options: SolverOptions,
         posture_prior: PosturePrior,
+        moments: LearnMoments,
         poses: int,
         rate_hz: float,
     ) -> None:
-        super().__init__(body, calibration, options, posture_prior)
+        super().__init__(body, calibration, options, posture_prior, moments)
         self.past: Floats = np.tile(self.qpos, (poses, 1))
         """(m, 55) the last answers, newest first."""
         self._rate_hz, self._length, self._recorded_s = rate_hz, 0, -np.inf

@@ -18,13 +18,13 @@ from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import Estimate, Origin, Status
 from harness.core.ranges import Range
+from harness.reconstruct.solver.frame_reader import SessionReader
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolution, IKSolver, Prior, Stopping
-from harness.reconstruct.solver.outlier_gate import JUMP_M, PATIENCE_S, OutlierGate
+from harness.reconstruct.solver.outlier_gate import JUMP_M, PATIENCE_S
+from harness.reconstruct.solver.reading_prediction import LearnMoments
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import candidate_placements, starting_postures
-from harness.reconstruct.solver.status_monitor import DeviceTime, StatusMonitor
-from harness.reconstruct.solver.temporal_alignment import TemporalAlignment, read_frame
 from harness.stream import TrackerFrame
 
 POSTURE_PRIOR_SIGMA_RAD = float(np.deg2rad(30.0))
@@ -90,7 +90,12 @@ class IKSession:
     """A `Session` by inverse kinematics. Methods override `track`, and `record` if they keep a history."""
 
     def __init__(
-        self, body: Body, calibration: Calibration, options: SolverOptions, posture_prior: PosturePrior
+        self,
+        body: Body,
+        calibration: Calibration,
+        options: SolverOptions,
+        posture_prior: PosturePrior,
+        moments: LearnMoments,
     ) -> None:
         self.residuals = Residuals(body, calibration, options.loss)
         self.limits = HingeLimits(body, keep=options.limits)
@@ -102,11 +107,9 @@ class IKSession:
         """(55,) the last answer."""
         self._posture_prior = posture_prior
         self._restart = options.restart
-        self._alignment = TemporalAlignment(len(calibration.stations)) if options.align else None
-        self._time, self.now_s = DeviceTime(), 0.0
+        self._reader = SessionReader(self.residuals, moments(calibration), options.jump_m, align=options.align)
+        self.now_s = 0.0
         """Time of this frame [s]."""
-        self._monitor = StatusMonitor(self._time)
-        self._gate = OutlierGate(len(calibration.stations), options.jump_m, clock=self._time)
         self._postures = postures if posture_prior.mean_qpos is None else (*postures, posture_prior.mean_qpos)
         self._contradiction = np.repeat([_CONTRADICTION_M, _CONTRADICTION_RAD], len(calibration.stations))
         """(2S,) residuals from which on a position or an orientation contradicts the pose [m, rad]."""
@@ -127,18 +130,19 @@ class IKSession:
         return self.solver.solve(start, self._posture_prior.prior(self.limits, previous))
 
     def outlier_share(self) -> float:
-        """The share of measured rows that contradict the pose evaluated last."""
+        """The share of rows measured in this frame that contradict the pose evaluated last."""
         residuals = self.residuals
-        return _share_beyond(residuals.state.squared, self._contradiction, residuals.measured)
+        return _share_beyond(residuals.state.squared, self._contradiction, residuals.fresh)
 
     def step(self, frame: TrackerFrame) -> Estimate:
         """The estimate after one frame; without any valid reading, the last pose again."""
-        status, any_valid = self._monitor.update(frame)
+        status, any_valid = self._reader.read(frame)
         self.origin = Origin.MODEL if any_valid else Origin.BRIDGED
-        self.now_s = self._time.frame_time_s(frame)
+        self.now_s = self._reader.clock.frame_time_s(frame)
         if any_valid:
-            read_frame(frame, self.residuals, self._gate, self._alignment)
-            cold = self._gate.all_moved or (not self._tracking and (status is Status.SOLVED or not self._started))
+            cold = self._reader.gate.all_moved or (
+                not self._tracking and (status is Status.SOLVED or not self._started)
+            )
             if cold:
                 solution = self.solve_cold()
             else:
@@ -146,20 +150,20 @@ class IKSession:
             self.qpos = self._canonical(solution.qpos)
             self._started = True
             self.record(frame, cold)
-            self._gate.update(self.residuals, self.qpos)
+            self._reader.update(self.qpos)
         self._tracking = status is Status.SOLVED or (self._tracking and status is not Status.LOST)
         return Estimate(self.qpos, status, self.origin)
 
     def _verify(self, warm: IKSolution) -> tuple[IKSolution, bool]:
         """The warm solution, or a cold one if readings contradict the warm one for too long; and whether it is cold."""
         contradicting = self.outlier_share() if self._restart else 0.0
-        if contradicting == 0.0 and not self._gate.left_out:
+        if contradicting == 0.0 and not self._reader.gate.left_out:
             self._contradicted_since_s = None
             return warm, False
         if self._contradicted_since_s is None:
             self._contradicted_since_s = self.now_s
         if contradicting < _OUTLIER_SHARE and (
-            self._gate.left_out or self.now_s - self._contradicted_since_s < PATIENCE_S
+            self._reader.gate.left_out or self.now_s - self._contradicted_since_s < PATIENCE_S
         ):
             return warm, False
         self._contradicted_since_s = self.now_s

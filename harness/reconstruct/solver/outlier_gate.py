@@ -23,6 +23,8 @@ from harness.stream import TrackerFrame
 
 JUMP_M, PATIENCE_S = 0.15, 0.25
 """More than the body departs from a prediction within a period; longer than a burst of echoes (8 records at 40 Hz)."""
+_SIGMAS = 3.0
+"""Standard deviations of a predicted place by which the next reading may be farther [choice]."""
 READING_JUMP_M = 0.10
 """More than readings of true motion depart from their own prediction within a period."""
 _MAX_PERIOD_S = 0.1
@@ -72,7 +74,7 @@ class OutlierGate:
             accepted_at_s=np.full(stations, -np.inf),
         )
         self._time, self._now_s = clock or DeviceTime(), -np.inf
-        arguments = self._limits, positions, never, self._no_offset_s, self._history, never
+        arguments = self._limits, positions, never, *(self._no_offset_s,) * 2, self._history, never
         self._judge = specialise(_judge, 0.0, 0.0, False, *arguments)
         self._follow = specialise(_follow, 0.0, positions, self._history)
         self.left_out = False
@@ -87,9 +89,10 @@ class OutlierGate:
 
         `offset_s` (S,) are the stations' sampling times from the instant that estimates answer [s]; None for 0.
         """
+        variance = residuals.variance[: len(residuals.bones)].copy()
         residuals.read(frame)
         self._now_s = self._time.frame_time_s(frame)
-        jumped = self.find_jumps(self._now_s, residuals.target_m, frame.position_valid, offset_s)
+        jumped = self.find_jumps(self._now_s, residuals.target_m, frame.position_valid, offset_s, variance)
         count = jumped.tobytes().count(True)
         self.readings += frame.position_valid.tobytes().count(True)
         self.rejected += count
@@ -102,16 +105,25 @@ class OutlierGate:
         residuals.evaluate(qpos)
         self.update_stations(self._now_s, residuals.station_m)
 
-    def find_jumps(self, now_s: float, target_m: Floats, measured: Bools, offset_s: Floats | None = None) -> Bools:
+    def find_jumps(
+        self,
+        now_s: float,
+        target_m: Floats,
+        measured: Bools,
+        offset_s: Floats | None = None,
+        variance_m2: Floats | None = None,
+    ) -> Bools:
         """(S,) which of the measured positions `target_m` (S, 3), in the world [m], to leave out of this frame.
 
-        The body is predicted at the time now + `offset_s` (S,) of each station [s].
+        The body is predicted at the time now + `offset_s` (S,) of each station [s]. A station may be farther from it
+        where its own place was predicted in the frame before, with `variance_m2` (S,).
         """
         out: Bools = np.empty(len(measured), bool)
         self.all_moved = self._judge(
             *(now_s, now_s - self._updated_at_s, self._moving, self._limits),
             *(np.ascontiguousarray(target_m), np.ascontiguousarray(measured)),
             self._no_offset_s if offset_s is None else np.ascontiguousarray(offset_s),
+            self._no_offset_s if variance_m2 is None else variance_m2,
             *(self._history, out),
         )
         return out
@@ -133,6 +145,7 @@ def _judge(
     target_m: Floats,
     measured: Bools,
     offset_s: Floats,
+    variance_m2: Floats,
     history: StationHistory,
     out: Bools,
 ) -> bool:
@@ -145,8 +158,9 @@ def _judge(
     out[:] = False
     all_moved = False
     if moving and 0.0 < period_s <= _MAX_PERIOD_S:
-        far = 0
+        far, known = 0, 0
         for s in range(len(out)):
+            known += measured[s] or variance_m2[s] > 0.0
             if not measured[s]:
                 continue
             if not history.has_velocity[s] and history.left_out[s] == 0:
@@ -154,7 +168,8 @@ def _judge(
             expected_m = history.body_m[s] + (period_s + offset_s[s]) * history.body_velocity_m_s[s]
             from_body_m = target_m[s] - expected_m
             from_readings_m = target_m[s] - history.position_m[s] - period_s * history.velocity_m_s[s]
-            is_far = _squared(from_body_m) > limits[0] ** 2
+            spread_m2 = variance_m2[s] if history.left_out[s] == 0 else 0.0
+            is_far = _squared(from_body_m) > limits[0] ** 2 + _SIGMAS**2 * spread_m2
             far += is_far
             if history.left_out[s] == 0:
                 follows = _follows(history.read_at_s[s], now_s, period_s)
@@ -163,7 +178,7 @@ def _judge(
             else:
                 in_burst = _squared(from_body_m) > _squared(from_body_m - history.offset_m[s])
                 out[s] = in_burst and not _goes_on(target_m[s], s, now_s, period_s, history)
-        all_moved = bool(far > 0 and 2 * far >= measured.sum())
+        all_moved = bool(far > 0 and 2 * far >= known)
         for s in range(len(out)):
             out[s] = out[s] and not all_moved and now_s - history.accepted_at_s[s] <= limits[1]
     _record(now_s, period_s, target_m, measured, out, history)

@@ -29,6 +29,9 @@ from harness.reconstruct.solver.normal_equations import (
 )
 from harness.stream import TrackerFrame
 
+_SCALE_VARIANCES = 8.0
+"""Multiple of the variance of a predicted row that is added to 2 sL^2 [choice]."""
+
 
 @dataclass(frozen=True)
 class Loss:
@@ -66,6 +69,8 @@ class Residuals:
         """(2S,) which rows the last frame measured."""
         self.confidence: Floats = np.zeros(2 * count)
         """(2S,) weight of each row by quality and suspicion: 1 full; 0 where not measured."""
+        self.variance: Floats = np.zeros(2 * count)
+        """(2S,) variance of the rows that were predicted instead of measured [m^2; rad^2]; 0 of the others."""
         self.target_m: Floats = np.zeros((count, 3))
         """(S, 3) measured station positions in the world [m]; 0 where not measured."""
         self.world_from_target: Floats = np.tile(rotations.IDENTITY, (count, 1))
@@ -112,6 +117,7 @@ class Residuals:
                 "TrackerFrame", "position_m", frame.position_m.shape, f"({len(self.bones)}, 3), as calibrated"
             )
         self.measured = np.empty(2 * len(self.bones), bool)
+        self.variance[:] = 0.0
         self._update_targets(self._measurement, self.targets, _readings_of(frame), self.measured, self.confidence)
 
     def completed(self, qpos: Floats) -> tuple[Floats, Floats]:
@@ -135,6 +141,27 @@ class Residuals:
         self.measured = self.measured & ~rows
         self.confidence[rows] = self.targets.precision[rows] = 0.0
 
+    def add_predictions(self, predicted: Bools, variance: Floats) -> None:
+        """Treat predicted rows (2S,), whose targets have a variance (2S,), as measured with it."""
+        self.measured = self.measured | predicted
+        self.variance[:] = np.where(predicted, variance, 0.0)
+        self.confidence[predicted] = 1.0
+        self.targets.precision[predicted] = 1.0 / (1.0 / self._measurement.precision + self.variance)[predicted]
+        self.targets.twice_scale_squared[:] += _SCALE_VARIANCES * self.variance
+
+    def count_sure(self, sigma_m: float) -> int:
+        """Number of stations with a measured reading, or a position predicted within a standard deviation [m]."""
+        count = len(self.bones)
+        fresh = self.fresh
+        sure = self.measured[:count] & (self.variance[:count] < sigma_m**2)
+        return int(np.count_nonzero(fresh[:count] | fresh[count:] | sure))
+
+    @property
+    def fresh(self) -> Bools:
+        """(2S,) which rows the frame itself measured."""
+        out: Bools = self.measured & (self.variance == 0.0)
+        return out
+
     def widen(self, factor: float) -> None:
         """Multiply the loss's own scales by `factor` until the next frame is read, to solve from a distant start.
 
@@ -144,6 +171,7 @@ class Residuals:
             self.targets.twice_scale_squared[:] = self._measurement.twice_scale_squared
         else:
             np.multiply(self._twice_scale_squared, factor * factor, out=self.targets.twice_scale_squared)
+        self.targets.twice_scale_squared[:] += _SCALE_VARIANCES * self.variance
 
     def evaluate(self, qpos: Floats) -> float:
         """The data cost of a configuration (55,), a negative log likelihood; updates `error` and `distance`."""

@@ -20,8 +20,8 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
 from harness.reconstruct.solver.kinematic_tree import KinematicState, KinematicTree
+from harness.reconstruct.solver.matrix_algebra import invert_positive_definite
 from harness.reconstruct.solver.normal_equations import StationTargets, normal_rows
-from harness.reconstruct.solver.subspace import invert_positive_definite
 from harness.reconstruct.solver.subspace_minimiser import Subspace, to_subspace, trace_of_product
 
 _MIN_DIAGONAL = 1e-6

@@ -57,20 +57,22 @@ class StatusMonitor:
         """`clock` is that of the session; without one the monitor has its own."""
         self._time, self._enough_at_s = clock or DeviceTime(), -math.inf
 
-    def update(self, frame: TrackerFrame) -> tuple[Status, bool]:
+    def update(self, frame: TrackerFrame, sure: int = 0) -> tuple[Status, bool]:
         """The status of this frame, and whether any station reports at all.
 
-        SOLVED with at least half of the stations; otherwise HELD, and LOST after `LOST_AFTER_S`.
+        SOLVED with at least half of the stations; otherwise HELD, and LOST after `LOST_AFTER_S`. A station counts when
+        it reports. Where others are predicted, `sure` is the number of stations that report or are surely predicted.
         """
         now_s = self._time.frame_time_s(frame)
-        count = (frame.position_valid | frame.orientation_valid).tobytes().count(True)
+        reporting = (frame.position_valid | frame.orientation_valid).tobytes().count(True)
+        count = max(reporting, sure)
         if 2 * count >= len(frame.position_valid) and count:
             self._enough_at_s = now_s
-            return Status.SOLVED, True
+            return Status.SOLVED, reporting > 0
         if self._enough_at_s == -math.inf:
             self._enough_at_s = now_s
         lost = now_s - self._enough_at_s > LOST_AFTER_S
-        return Status.LOST if lost else Status.HELD, count > 0
+        return Status.LOST if lost else Status.HELD, reporting > 0
 
 
 @compiled

@@ -23,7 +23,6 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, immutable
 from harness.core.compiled import compiled, specialise
 from harness.core.compiled_rotations import as_tuple, quaternion_product, rotation_vector
-from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Residuals
 from harness.stream import TrackerFrame
 
@@ -40,8 +39,6 @@ _MIN_OFFSET_S = 1e-6
 class AlignmentHistory(NamedTuple):
     """The last readings of S stations, as measured."""
 
-    slot_s: Floats
-    """(S,) sampling time of each station, relative to any time that all share; NaN before its first record [s]."""
     last_s: Floats
     """(S,) time of the last record [s]."""
     before_s: Floats
@@ -58,22 +55,11 @@ class AlignmentHistory(NamedTuple):
     """(S,) number of orientations in a row up to the last record."""
 
 
-def read_frame(
-    frame: TrackerFrame, residuals: Residuals, gate: OutlierGate, alignment: "TemporalAlignment | None"
-) -> None:
-    """Let residuals read a frame without the positions that jumped, at one instant if there is an alignment."""
-    if alignment is None:
-        gate.read(frame, residuals)
-    else:
-        alignment.read(frame, residuals, gate)
-
-
 class TemporalAlignment:
     """Moves the readings of S stations to one instant per frame, for one session."""
 
     def __init__(self, stations: int) -> None:
         self._history = AlignmentHistory(
-            slot_s=np.full(stations, np.nan),
             last_s=np.full(stations, np.nan),
             before_s=np.full(stations, np.nan),
             last_m=np.zeros((stations, 3)),
@@ -82,21 +68,14 @@ class TemporalAlignment:
             last_turn=np.tile(rotations.IDENTITY, (stations, 1)),
             orientations=np.zeros(stations, np.int64),
         )
-        self._offset_s: Floats = np.zeros(stations)
         record = immutable(np.zeros(stations)), immutable(np.zeros(stations), bool)
         readings = np.zeros(2 * stations, bool), np.zeros((stations, 3)), np.zeros((stations, 4))
-        self._measure_offsets = specialise(measure_offsets, *record, self._history.slot_s, self._offset_s)
-        self._align = specialise(align_readings, *record, self._offset_s, *readings, self._history)
+        self._align = specialise(align_readings, *record, np.zeros(stations), *readings, self._history)
 
-    def read(self, frame: TrackerFrame, residuals: Residuals, gate: OutlierGate) -> None:
-        """Let residuals read a frame, leave out the positions that jumped, and move the others to one instant.
-
-        The gate predicts each station at its own sampling time.
-        """
-        self._measure_offsets(frame.measured_s, frame.suspect, self._history.slot_s, self._offset_s)
-        gate.read(frame, residuals, self._offset_s)
+    def align(self, frame: TrackerFrame, residuals: Residuals, offset_s: Floats) -> None:
+        """Move the readings of a frame to one instant; `offset_s` (S,) are their times from it (`measure_offsets`)."""
         self._align(
-            *(frame.measured_s, frame.suspect, self._offset_s),
+            *(frame.measured_s, frame.suspect, offset_s),
             *(residuals.measured, residuals.target_m, residuals.world_from_target),
             self._history,
         )
@@ -148,10 +127,11 @@ def align_readings(
 
 
 @compiled
-def measure_offsets(measured_s: Floats, suspect: Bools, slot_s: Floats, out: Floats) -> None:
+def measure_offsets(measured_s: Floats, suspect: Bools, slot_s: Floats, out: Floats) -> float:
     """Fill in the sampling times (S,) from the frame's instant [s]; 0 where no record arrived or it is suspect.
 
-    The instant is the mean sampling time of the stations known so far. Their slots (S,) are updated.
+    The instant is the mean sampling time of the stations known so far. Their slots (S,) are updated. Returns the
+    instant [s]; NaN when no usable record arrived.
     """
     start_s, records = 0.0, 0
     for s in range(len(measured_s)):
@@ -172,6 +152,7 @@ def measure_offsets(measured_s: Floats, suspect: Bools, slot_s: Floats, out: Flo
     for s in range(len(measured_s)):
         offset_s = 0.0 if suspect[s] or np.isnan(measured_s[s]) else measured_s[s] - instant_s
         out[s] = offset_s if abs(offset_s) >= _MIN_OFFSET_S else 0.0
+    return instant_s
 
 
 @compiled

@@ -12,6 +12,8 @@ from harness.reconstruct.solver.ground_frame import ground_from_qpos, posture_fr
 from tests.reconstruct.conftest import Scene
 
 ALL: Bools = np.ones(12, bool)
+EXACT: Floats = np.zeros(12)
+"""Variance of predicted rows: none is predicted."""
 
 
 @pytest.fixture(scope="module")
@@ -101,13 +103,13 @@ def test_imputation_adds_the_covariance_of_what_the_regression_leaves(experts: L
     assert np.linalg.eigvalsh(added).min() > -1e-9 * np.trace(added)
     wanted = away.T @ away / len(away) + regression.ridge * gain.T @ gain
     np.testing.assert_allclose(added, wanted, atol=1e-5 * np.trace(added))
-    less, more = (entry.error_covariance(0.0, 0.0) for entry in (whole, part))
+    less, more = (entry.error_covariance(0.0, 0.0, EXACT) for entry in (whole, part))
     assert np.trace(more) > np.trace(less)
 
 
 def test_fewer_readings_err_more(experts: LocalExperts) -> None:
     traces = [
-        np.trace(experts.feature_map(measured, history).error_covariance(1e-3, 1e-3))
+        np.trace(experts.feature_map(measured, history).error_covariance(1e-3, 1e-3, EXACT))
         for measured, history in ((ALL, True), (without(0), True), (without(0, 6), True), (without(0, 6), False))
     ]
     assert traces == sorted(set(traces))
@@ -136,8 +138,29 @@ def test_errors_of_positions_and_of_past_poses_go_through_the_map(experts: Local
     np.testing.assert_allclose(to_z.position, places.T @ places)
     np.testing.assert_allclose(to_z.orientation, regression.options.lever_m**2 * axes.T @ axes)
     np.testing.assert_allclose(
-        to_z.error_covariance(0.002, 0.05), to_z.fixed + 4e-6 * to_z.position + 2.5e-3 * to_z.orientation
+        to_z.error_covariance(0.002, 0.05, EXACT), to_z.fixed + 4e-6 * to_z.position + 2.5e-3 * to_z.orientation
     )
+
+
+def test_the_variance_of_a_predicted_reading_goes_through_its_rows_of_the_map(experts: LocalExperts) -> None:
+    """Station 2 errs by 5 cm along every axis, and station 4 by 0.3 rad about every axis."""
+    to_z = experts.feature_map(ALL, True)
+    variance = EXACT.copy()
+    variance[[2, 6 + 4]] = 0.05**2, 0.3**2
+    rows = to_z.matrix[experts.regression.windows.size :].reshape(6, 9, -1)
+    lever = experts.regression.options.lever_m
+    wanted = 0.05**2 * rows[2, :3].T @ rows[2, :3] + (0.3 * lever) ** 2 * rows[4, 3:].T @ rows[4, 3:]
+    added = to_z.error_covariance(0.0, 0.0, variance) - to_z.error_covariance(0.0, 0.0, EXACT)
+    np.testing.assert_allclose(added, wanted, atol=1e-9 * np.trace(to_z.fixed))
+    np.testing.assert_allclose(to_z.readings[:6].sum(axis=0), to_z.position)
+    np.testing.assert_allclose(to_z.readings[6:].sum(axis=0), to_z.orientation)
+
+
+def test_imputation_keeps_the_covariance_of_each_reading(experts: LocalExperts) -> None:
+    part = experts.feature_map(without(3), True)
+    np.testing.assert_allclose(part.readings[:6].sum(axis=0), part.position)
+    assert not part.readings[3].any()
+    assert part.readings[2].any()
 
 
 def test_maps_are_made_once_and_few_are_kept(experts: LocalExperts, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,6 +18,7 @@ from harness.experiment import ClipEvaluation, prepare_playback
 from harness.experiment.scenarios import load_scenario
 from harness.mocap import open_motion_source
 from harness.reconstruct import registry
+from harness.reconstruct.features.station_increments import StationIncrements
 from harness.reconstruct.methods.clean_up import CleanUp, FittedCleanUp
 from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.score import wrap_difference
@@ -99,6 +100,7 @@ def test_an_answer_to_a_frame_that_was_never_received_is_refused() -> None:
     inner: Any = SimpleNamespace(
         begin=lambda calibration: SimpleNamespace(step=lambda frame: Estimate(np.ones(55), Status.SOLVED, lag=1))
     )
-    fitted = FittedCleanUp(CleanUp(MeanPose()), build_body(), inner, np.ones(48))
+    body = build_body()
+    fitted = FittedCleanUp(CleanUp(MeanPose()), body, inner, np.ones(48), StationIncrements(body, ()))
     with pytest.raises(ValueError, match="a lag of 1 frames, but an answer may go back 0 at most"):
         fitted.begin(simulation.calibration).step(simulation.frames[0])

@@ -92,7 +92,7 @@ def test_lost_stations_are_left_out_and_taken_up_again(walk: Scene, silent: list
     assert np.max(off_m[90:]) < 0.03
 
 
-def test_status_follows_what_reports(walk: Scene) -> None:
+def test_status_follows_what_reports_or_is_surely_predicted(walk: Scene) -> None:
     two_left, nothing = [0, 1, 2, 3], range(6)
     frames = [
         drop_stations(f, two_left) if 20 <= i < 60 else drop_stations(f, nothing) if 60 <= i < 90 else f
@@ -100,9 +100,11 @@ def test_status_follows_what_reports(walk: Scene) -> None:
     ]
     estimates = walk.run(Ik(), frames)
     status = [e.status for e in estimates]
-    assert set(status[:20]) == {Status.SOLVED}
-    assert set(status[20:40]) == {Status.HELD}  # up to 0.5 s after frame 19
-    assert set(status[40:90]) == {Status.LOST}
+    sure = status.index(Status.HELD)  # until then a third station is predicted within 0.15 m
+    assert 25 <= sure <= 40
+    assert set(status[:sure]) == {Status.SOLVED}
+    assert set(status[sure : sure + 20]) == {Status.HELD}  # up to 0.5 s after the last solved frame
+    assert set(status[sure + 20 : 90]) == {Status.LOST}
     assert set(status[90:]) == {Status.SOLVED}
     np.testing.assert_array_equal(estimates[60].qpos, estimates[89].qpos)
     assert not np.array_equal(estimates[30].qpos, estimates[50].qpos)  # two stations still lead the pose

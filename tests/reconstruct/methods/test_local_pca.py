@@ -11,9 +11,9 @@ from harness.reconstruct.methods.local_pca import LocalPca
 from harness.reconstruct.solver.ground_frame import ground_from_qpos, posture_from_qpos, qpos_from_posture
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolution, Stopping
-from harness.reconstruct.solver.matrix_algebra import factorise, new_rows, solve_factorised
+from harness.reconstruct.solver.matrix_algebra import factorise, invert_positive_definite, new_rows, solve_factorised
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace, invert_positive_definite
+from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace
 from harness.reconstruct.solver.subspace_minimiser import (
     Subspace,
     damp,

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
+from harness.core.calibration import Calibration
 from harness.core.estimate import Origin
 from harness.reconstruct.contract import Method
 from harness.reconstruct.methods.dynamic_map import WINDOW
@@ -13,6 +14,7 @@ from harness.reconstruct.methods.local_pca import LocalPca
 from harness.reconstruct.solver.history_session import HistorySession
 from harness.reconstruct.solver.ik_session import PosturePrior, SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution
+from harness.reconstruct.solver.reading_prediction import IncrementMoments, unlearnt_moments
 from harness.stream import TrackerFrame
 from harness.testing.frames import drop_stations
 from tests.reconstruct.conftest import Scene
@@ -21,12 +23,16 @@ RISE = 0.001
 """Every bridged period adds this to the last hinge [rad]."""
 
 
+def no_examples(calibration: Calibration) -> IncrementMoments:
+    return unlearnt_moments(len(calibration.stations))
+
+
 class Counting(HistorySession):
     """Answers with the last pose, and keeps the history that it was given."""
 
     def __init__(self, scene: Scene, poses: int) -> None:
         prior = PosturePrior(scene.take.qpos[0], np.ones(48))
-        super().__init__(scene.body, scene.calibration, SolverOptions(), prior, poses, 40.0)
+        super().__init__(scene.body, scene.calibration, SolverOptions(), prior, no_examples, poses, 40.0)
         self.shown: list[Floats] = []
 
     def solve_next(self) -> IKSolution:

@@ -9,9 +9,11 @@ from harness.body import DEFAULT_MOUNTS
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.reconstruct import registry
+from harness.reconstruct.solver.frame_reader import SessionReader
 from harness.reconstruct.solver.outlier_gate import OutlierGate
+from harness.reconstruct.solver.reading_prediction import unlearnt_moments
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.temporal_alignment import MAX_BEND_M, MAX_STEP_S, MAX_TURN_RAD, TemporalAlignment
+from harness.reconstruct.solver.temporal_alignment import MAX_BEND_M, MAX_STEP_S, MAX_TURN_RAD
 from harness.simulate import Noise, TrackerConfig, simulate_tracker
 from harness.stream import TrackerFrame
 from harness.testing.frames import drop_stations
@@ -72,13 +74,28 @@ class ChosenOutliers(OutlierGate):
 def align(
     walk: Scene, frames: list[TrackerFrame], left_out: dict[int, list[int]] | None = None
 ) -> list[tuple[Floats, Floats]]:
-    """Aligned targets of each frame. `left_out`: stations by frame."""
-    residuals, alignment = Residuals(walk.body, walk.calibration, Loss()), TemporalAlignment(6)
-    out, gate = [], ChosenOutliers(left_out or {})
+    """Aligned targets of each frame, without those predicted: as read instead. `left_out`: stations by frame."""
+    reader = reader_of(walk, ChosenOutliers(left_out or {}))
+    out, residuals = [], reader.residuals
     for frame in frames:
-        alignment.read(frame, residuals, gate)
-        out.append((residuals.target_m.copy(), residuals.world_from_target.copy()))
+        reader.read(frame)
+        predicted = ~residuals.fresh.reshape(2, -1, 1)
+        out.append(
+            tuple(
+                np.where(rows, as_read, found)
+                for rows, as_read, found in zip(
+                    predicted, read(walk, frame), (residuals.target_m, residuals.world_from_target), strict=True
+                )
+            )
+        )
     return out
+
+
+def reader_of(walk: Scene, gate: OutlierGate) -> SessionReader:
+    """A reader that aligns, with this gate."""
+    reader = SessionReader(Residuals(walk.body, walk.calibration, Loss()), unlearnt_moments(6), align=True)
+    reader.gate = gate
+    return reader
 
 
 def moved(walk: Scene, frames: list[TrackerFrame], left_out: dict[int, list[int]] | None = None) -> Bools:
@@ -127,9 +144,10 @@ def test_the_gate_learns_when_each_station_was_sampled(walk: Scene, rng: np.rand
     frames = Motion(rng, degree=1).frames(3)
     frames[1] = replace(drop_stations(frames[1], [0]), suspect=np.arange(6) == 3)
     frames.append(Motion(rng, degree=1).at_one_instant(3))
-    gate, alignment = ChosenOutliers({}), TemporalAlignment(6)
+    gate = ChosenOutliers({})
+    reader = reader_of(walk, gate)
     for frame in frames:
-        alignment.read(frame, Residuals(walk.body, walk.calibration, Loss()), gate)
+        reader.read(frame)
     np.testing.assert_allclose(gate.offsets_s[0], SLOT_S, atol=1e-12)
     np.testing.assert_allclose(gate.offsets_s[1], np.where(np.isin(np.arange(6), [0, 3]), 0.0, SLOT_S), atol=1e-12)
     np.testing.assert_allclose(gate.offsets_s[2], SLOT_S, atol=1e-12)
