@@ -1,9 +1,10 @@
 """How far stations move in a time: second moments of their increments over the examples, all stations jointly.
 
 The increment of station s over an age a is D_s(a) = x_s(t - a) - x_s(t): of its position [m], and the rotation vector
-of its bone [rad]. Moments E[D D^T] are kept for ages of whole steps: one period of the examples at up to 40 Hz, more at
-higher rates, so that the ages reach as far back as readings are kept. Both horizontal axes share one table, so that no
-heading counts; the vertical axis has its own. `solver.reading_prediction` predicts with them.
+of its bone [rad]. Moments E[D D^T] are kept for ages of whole steps: one period of the examples at 40 Hz, more at higher
+rates, so that the ages reach as far back as readings are kept. Examples of a slower tracker are interpolated by cubic
+splines. Both horizontal axes share one table, so that no heading counts; the vertical axis has its own.
+`solver.reading_prediction` predicts with them.
 """
 
 import math
@@ -56,8 +57,8 @@ class StationIncrements:
         trackers, stations = VirtualTrackers(self.body, calibration), len(calibration.stations)
         total, count = np.zeros((4, stations * AGES, stations * AGES)), 0
         rate_hz = _rate_hz(self.examples)
-        step = max(1, math.ceil(OLDEST_S * rate_hz / OLDEST_AGE - 1e-9))
         factor = max(1, math.ceil(_LEAST_RATE_HZ / rate_hz - 1e-9)) if rate_hz else 1
+        step = max(1, math.ceil(OLDEST_S * factor * rate_hz / OLDEST_AGE - 1e-9))
         for qpos, now in _sampled_runs(self.examples, step, factor):
             at_m, turned = _upsampled(*trackers.station_poses(qpos), factor)
             before = now[:, None] - step * np.arange(-NEWEST_AGE, OLDEST_AGE + 1)

@@ -116,3 +116,17 @@ def test_without_examples_moments_are_those_of_no_examples(walk: Scene) -> None:
 def test_moments_of_a_calibration_are_learnt_once(walk: Scene) -> None:
     increments = StationIncrements(walk.body, walk.examples)
     assert increments.moments(walk.calibration) is increments.moments(walk.calibration)
+
+
+def test_examples_of_a_slow_tracker_tell_ages_within_a_period(walk: Scene) -> None:
+    """A body that swings once a second is told at 4 Hz nearly as at 40 Hz. Straight lines between frames would not do."""
+    at_s = np.arange(401) / 40.0
+    qpos = np.tile(walk.take.qpos[30], (len(at_s), 1))
+    qpos[:, 0] += 0.2 * np.sin(2.0 * np.pi * at_s)
+    fine = learn(walk, [BodyMotion("swing", "p1", "builtin", "swinging", 40.0, qpos)])
+    slow = learn(walk, [BodyMotion("swing", "p1", "builtin", "swinging", 4.0, qpos[::10])])
+    assert slow.period_s == pytest.approx(fine.period_s)
+    now = NEWEST_AGE
+    for ages in (5, 10, 20):
+        told = slow.table[0, 0, now + ages, 0, now + ages]
+        assert told == pytest.approx(fine.table[0, 0, now + ages, 0, now + ages], rel=0.05)
