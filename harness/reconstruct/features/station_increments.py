@@ -1,9 +1,9 @@
 """How far stations move in a time: second moments of their increments over the examples, all stations jointly.
 
 The increment of station s over an age a is D_s(a) = x_s(t - a) - x_s(t): of its position [m], and the rotation vector
-of its bone [rad]. Moments E[D D^T] are kept for ages of whole steps: one period of the examples at 40 Hz, more at higher
-rates, so that the ages reach as far back as readings are kept. Examples of a slower tracker are interpolated by cubic
-splines. Both horizontal axes share one table, so that no heading counts; the vertical axis has its own.
+of its bone [rad]. Moments E[D D^T] are kept for ages of whole steps: one period of the examples at 40 Hz, more at
+higher rates, so that the ages reach as far back as readings are kept. Examples of a slower tracker are interpolated by
+cubic splines. Both horizontal axes share one table, so that no heading counts; the vertical axis has its own.
 `solver.reading_prediction` predicts with them.
 """
 

@@ -119,7 +119,7 @@ def test_moments_of_a_calibration_are_learnt_once(walk: Scene) -> None:
 
 
 def test_examples_of_a_slow_tracker_tell_ages_within_a_period(walk: Scene) -> None:
-    """A body that swings once a second is told at 4 Hz nearly as at 40 Hz. Straight lines between frames would not do."""
+    """A body that swings once a second is told at 4 Hz nearly as at 40 Hz; straight lines would not do."""
     at_s = np.arange(401) / 40.0
     qpos = np.tile(walk.take.qpos[30], (len(at_s), 1))
     qpos[:, 0] += 0.2 * np.sin(2.0 * np.pi * at_s)
