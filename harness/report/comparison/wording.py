@@ -29,6 +29,10 @@ OUTCOME_TITLES: Mapping[Outcome, str] = {
 }
 
 
+_LEAST_SHARE = 0.01
+"""Share of the margin below which a difference is of no interest [choice]."""
+
+
 def outcome_title(outcome: Outcome, comparisons: Iterable[Comparison]) -> str:
     """The word for an outcome. Where everything can be compared and lines are undecided it is "Cannot tell"."""
     undecided = [each for each in comparisons if each.outcome is outcome is Outcome.NOT_COMPARABLE]
@@ -189,8 +193,13 @@ def format_margin(line: Difference) -> str:
 
 
 def line_interval(line: Difference) -> Interval:
-    """The difference with its 95 % interval."""
-    return Interval.of(line.difference, line.low, line.high, signed=True)
+    """The difference with its 95 % interval. What is below a hundredth of the margin counts as 0."""
+    least = _LEAST_SHARE * line.margin
+    value, low, high = (
+        0.0 if number is not None and abs(number) < least else number
+        for number in (line.difference, line.low, line.high)
+    )
+    return Interval.of(value, low, high, signed=True)
 
 
 def clip_steps(line: Difference) -> list[tuple[str, float]]:
@@ -210,7 +219,7 @@ def count_directions(line: Difference) -> tuple[int, int, int]:
 
 
 def _decimals(line: Difference) -> int:
-    """Decimals that show two digits of the interval's width, or of the smaller of difference and margin."""
+    """Decimals that show two digits of the interval's width, or of the margin where that is a hundred times as wide."""
     width = line.high - line.low if line.low is not None and line.high is not None else 0.0
-    sizes = (width,) if width > 1e-3 * line.margin else (abs(line.difference), line.margin)
-    return decimals_for(*sizes, digits=2, most=6)
+    narrow = width <= _LEAST_SHARE * line.margin
+    return decimals_for(line.margin if narrow else width, digits=2, most=6)

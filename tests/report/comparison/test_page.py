@@ -24,6 +24,7 @@ from harness.report.comparison.wording import (
     count_verdicts,
     describe_parts,
     format_margin,
+    format_mean,
     line_interval,
 )
 from harness.report.kit.chart import draw_chart
@@ -262,3 +263,14 @@ def test_the_same_comparison_gives_the_same_bytes() -> None:
     assert slope_chart(one.differences[0], 1) == slope_chart(one.differences[0], 1)
     first, again = (draw() for _ in range(2) for draw in interval_charts([one], True))
     assert first == again
+
+
+def test_what_is_far_below_the_margin_has_no_digits_of_its_own() -> None:
+    line = replace(
+        one_line(0.0), mean_a=620.9863, mean_b=620.9832, difference=-0.0031, low=-0.023, high=0.004, margin=12.4
+    )
+    assert str(line_interval(line)) == "0"
+    assert (format_mean(line, line.mean_a), format_margin(line)) == ("621", "12")
+    wider = replace(line, low=-0.2)
+    assert line_interval(wider).ends.startswith("−0.2")
+    assert format_mean(wider, wider.mean_a) == "620.99"
