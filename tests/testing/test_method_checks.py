@@ -19,13 +19,11 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Origin, Status
 from harness.core.motion import BodyMotion
 from harness.reconstruct.solver import StatusMonitor
-from harness.reconstruct.solver.reading_prediction import OLDEST_S
 from harness.stream import TrackerFrame
 from harness.testing import method_checks
 from harness.testing.contract_case import make_case
 from harness.testing.method_checks import MethodContractError, RuleResult, check_method, check_rules
 from harness.testing.rules import RULES
-from harness.testing.rules.semantics import PREDICTED_S
 from tests.command import Command
 
 
@@ -519,7 +517,3 @@ def test_the_verb_reports_violations_of_a_users_method(
     assert violation["rule"] == "the status reports lost stations"
     assert "the status was SOLVED while 4 of 6 stations reported nothing" in violation["seen"]
     command("check", "always_solved:Yours", code=2)
-
-
-def test_a_status_may_count_on_predictions_as_long_as_readings_are_kept() -> None:
-    assert PREDICTED_S == OLDEST_S

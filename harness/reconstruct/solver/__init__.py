@@ -10,12 +10,14 @@ if TYPE_CHECKING:
     from harness.reconstruct.solver.hinge_limits import HingeLimits
     from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
     from harness.reconstruct.solver.outlier_gate import OutlierGate
+    from harness.reconstruct.solver.reading_prediction import OLDEST_S
     from harness.reconstruct.solver.residuals import Loss, Residuals
     from harness.reconstruct.solver.status_monitor import StatusMonitor
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
 __all__ = [
+    "OLDEST_S",
     "POSTURE_SIZE",
     "HingeLimits",
     "IKSolver",

@@ -9,7 +9,7 @@ from harness.core.arrays import Floats
 from harness.core.estimate import HINGE_COUNT, LOST_AFTER_S, Origin, Status, session_lag
 from harness.core.split import EXAMPLES, NONE, UNKNOWN, declared_training_data, training_note
 from harness.errors import BadInput
-from harness.reconstruct.solver import Loss, Residuals
+from harness.reconstruct.solver import OLDEST_S, Loss, Residuals
 from harness.results import MAX_FALLBACK_SHARE
 from harness.score import WARM_UP_S, wrap_difference
 from harness.testing.contract_case import (
@@ -25,8 +25,6 @@ from harness.testing.contract_case import (
 )
 from harness.testing.frames import drop_stations, exact_frames
 
-PREDICTED_S = 0.6
-"""Longest time for which a silent station may count as known [s], as in `solver.reading_prediction`."""
 MAX_RECOVERED_RATIO = 1.5
 """An error has recovered when it is at most this many times that of an undisturbed session, plus `_TOLERANCE_MM`."""
 _TOLERANCE_MM = 5.0
@@ -37,7 +35,7 @@ _POSTURE_TOLERANCE_DEG = 0.5
 def reports_tracking_loss(case: ContractCase) -> str:
     """The status is SOLVED with at least half of the stations, else HELD, and LOST after more than 0.5 s.
 
-    A method may count a silent station as known for `PREDICTED_S`, because it predicts it.
+    A method may count a silent station as known for `OLDEST_S`, because it predicts it (`solver.reading_prediction`).
     """
     count = len(case.calibration.stations)
     for silent in (range(1), range(count // 2), range(count // 2 + 1), range(count)):
@@ -66,7 +64,7 @@ def reports_tracking_loss(case: ContractCase) -> str:
 def _statuses_after(silent_s: float) -> list[Status]:
     """What the status may be while most stations have been silent for so long [s]."""
     least_s = {Status.SOLVED: 0.0, Status.HELD: 0.0, Status.LOST: LOST_AFTER_S}
-    most_s = {Status.SOLVED: PREDICTED_S, Status.HELD: PREDICTED_S + LOST_AFTER_S, Status.LOST: math.inf}
+    most_s = {Status.SOLVED: OLDEST_S, Status.HELD: OLDEST_S + LOST_AFTER_S, Status.LOST: math.inf}
     return [one for one in least_s if least_s[one] - 1e-9 <= silent_s <= most_s[one] + 1e-9]
 
 
