@@ -61,7 +61,7 @@ def test_turns_are_rotation_vectors_about_the_axes_of_the_world(walk: Scene) -> 
 
 def written_out(walk: Scene, takes: list[BodyMotion]) -> Floats:
     """The moments of positions (2, S, A, S, A), with each frame of each take that has all ages."""
-    rows = []
+    rows: list[list[Floats]] = []
     for take in takes:
         at_m, _ = station_poses(walk.body, take, walk.calibration)
         now = range(OLDEST_AGE, len(take) - NEWEST_AGE)

@@ -79,15 +79,13 @@ def align(
     out, residuals = [], reader.residuals
     for frame in frames:
         reader.read(frame)
-        predicted = ~residuals.fresh.reshape(2, -1, 1)
-        out.append(
-            tuple(
-                np.where(rows, as_read, found)
-                for rows, as_read, found in zip(
-                    predicted, read(walk, frame), (residuals.target_m, residuals.world_from_target), strict=True
-                )
-            )
+        places, turns = ~residuals.fresh.reshape(2, -1, 1)
+        at_m, turned = read(walk, frame)
+        aligned: tuple[Floats, Floats] = (
+            np.where(places, at_m, residuals.target_m),
+            np.where(turns, turned, residuals.world_from_target),
         )
+        out.append(aligned)
     return out
 
 
