@@ -1,7 +1,8 @@
 """What a session does with a frame before it solves: status, outlier gate, temporal alignment, silent stations.
 
-All methods read their frames through it. The gate comes first and compares readings as measured. What it lets through
-is moved to the frame's instant, where the method asks for it. Stations that the frame lacks are predicted last.
+All methods with an outlier gate read their frames through it. The gate comes first and compares readings as measured.
+What it lets through is moved to the frame's instant, where the method asks for it. Stations that the frame lacks are
+predicted last.
 """
 
 import numpy as np
