@@ -31,7 +31,7 @@ LAB = "lab"
 SPEED = "speed"
 _FLAGS_BY_USE = {
     SPEED: ("seed", "large", "runs"),
-    ACCURACY: ("method", "seeds", "jobs", "out", "mocap", "baseline", "save", "quick", "force"),
+    ACCURACY: ("method", "seeds", "jobs", "out", "mocap", "baseline", "save", "quick", "only", "force"),
     RANKING: ("quick", "jobs", "out", "mocap"),
     "physics --truth": ("seeds", "out"),
     "lab --truth": ("seeds", "out", "jobs"),
@@ -67,6 +67,8 @@ def add_bench(verbs: Verbs) -> None:
     text = "accuracy: stored errors to compare with (default: those of dynamic_map of commit 40f3d61)"
     verb.add_argument("--baseline", type=Path, metavar="FILE", help=text)
     verb.add_argument("--save", type=output_file, metavar="FILE", help="accuracy: store the method's errors in FILE")
+    text = "accuracy: only the noise presets of the accuracy tables, or only the set-ups of stations, line and faults"
+    verb.add_argument("--only", choices=("presets", "setups"), help=text)
     text = "accuracy: one seed, three clips, no verdict (exit code 3); ranking: two performers, three methods and sets"
     verb.add_argument("--quick", action="store_true", default=None, help=text)
 
@@ -159,21 +161,32 @@ def _bench_lab_truth(args: argparse.Namespace) -> Outcome:
 
 
 def _bench_accuracy(args: argparse.Namespace) -> Outcome:
-    from harness.bench.accuracy.clip_errors import DEFAULT_BASELINE, StoredErrors, read_errors, write_errors
+    from harness.bench.accuracy.clip_errors import (
+        DEFAULT_BASELINE,
+        SETUP_BASELINES,
+        StoredErrors,
+        read_errors,
+        write_errors,
+    )
     from harness.bench.accuracy.conditions import DEFAULT_METHOD, SEEDS
-    from harness.bench.accuracy.measurement import clean_commit, measure_accuracy
+    from harness.bench.accuracy.measurement import TABLES, clean_commit, measure_accuracy
     from harness.bench.accuracy.text import format_report, report_content
     from harness.core.files import require_writable
 
-    if args.quick and (args.save or args.seeds):
-        raise BadInput("--quick has one seed and few clips.", "Leave out --save and --seeds, or leave out --quick.")
+    if args.quick and (args.save or args.seeds or args.only):
+        advice = "Leave out --save, --seeds and --only, or leave out --quick."
+        raise BadInput("--quick has one seed and few clips, and no set-ups.", advice)
     seeds = _first_seeds(args, SEEDS)
     if args.save:
         require_writable(args.save, "errors by clip", force=args.force)
     commit = clean_commit() if args.save else ""
     stored, method = read_errors(args.baseline or DEFAULT_BASELINE), args.method or DEFAULT_METHOD
+    tables = (args.only,) if args.only else TABLES
+    references = [] if args.quick or args.only == "presets" else list(map(read_errors, SETUP_BASELINES))
     with _cells(args, ACCURACY) as options:
-        report = measure_accuracy(method, stored, seeds=seeds, quick=bool(args.quick), **options)
+        report = measure_accuracy(
+            method, stored, references=references, tables=tables, seeds=seeds, quick=bool(args.quick), **options
+        )
     if args.save and not report.failures:
         write_errors(args.save, StoredErrors(method, commit, seeds, report.by_method[method]))
     return print_result(args, report_content(report), format_report(report), outcome=report.outcome)

@@ -26,9 +26,15 @@ CELL_METRICS = (ANGLE, POSITION, JITTER, TRUE_JITTER, SKATE, TRUE_SKATE)
 """Metrics of a cell that are kept for every condition (docs/metrics.md)."""
 SILENT_ANGLE = "joint_angle_silent_deg"
 """Mean joint angle error while the station is silent [deg]; only where one is."""
+COVERAGES = ("sigma_coverage_1", "sigma_coverage_2")
+"""Shares of errors within one and two of the stated sigma; only of methods that state one."""
 SIGNIFICANT_DIGITS = 6
 DEFAULT_BASELINE = BASELINES / "accuracy" / "dynamic_map_40f3d61.json"
 """Errors of `dynamic_map` of commit 40f3d61, relative to the root of a source checkout."""
+SETUP_BASELINES = tuple(
+    BASELINES / "accuracy" / f"{method}_23b301b.json" for method in ("ik", "kernel_cca", "dynamic_map", "expert_map")
+)
+"""Errors of four methods of commit 23b301b under every set-up."""
 _EXPECTED = "errors by clip, as `harness bench accuracy --save` writes them"
 _ADVICE = "Work in the root of a source checkout, restore the file there, or name another with --baseline."
 
@@ -122,8 +128,8 @@ def read_errors(path: Path) -> StoredErrors:
 
 
 def _read_clip(entry: Mapping[str, Any], seeds: int) -> ClipErrors:
-    by_metric = {name: entry[name] for name in (*CELL_METRICS, SILENT_ANGLE) if name in entry}
-    for name in CELL_METRICS:
+    by_metric = {name: entry[name] for name in (*CELL_METRICS, SILENT_ANGLE, *COVERAGES) if name in entry}
+    for name in (ANGLE, POSITION):
         if name not in by_metric:
             raise ValueError(f"a clip without {name}")
     for name, values in by_metric.items():

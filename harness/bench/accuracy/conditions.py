@@ -45,11 +45,14 @@ class Condition:
     """Which of position and orientation each station delivers."""
     silent: str = ""
     """Station that is lost from 3 s to 5 s; "" for none."""
+    setup: str = ""
+    """Name of a set-up (see `setups`); "" for six stations on a fast line."""
 
     def __str__(self) -> str:
         """Name of the condition, such as "boxing, default" or "recovery_boxing, default, torso silent"."""
         inputs = "" if self.inputs == "pos+ori" else f", {self.inputs}"
-        return f"{self.scenario}, {self.noise}{inputs}" + (f", {self.silent} silent" if self.silent else "")
+        more = (f"{self.silent} silent" if self.silent else "", self.setup)
+        return f"{self.scenario}, {self.noise}{inputs}" + "".join(f", {text}" for text in more if text)
 
     def seeds(self, seeds: Sequence[int]) -> tuple[int, ...]:
         """The seeds of its cells: the first one under `clean`, else all."""

@@ -1,15 +1,16 @@
 """Run the cells of the accuracy benchmark, and collect their errors by method, condition, clip and seed."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from harness.bench.accuracy.clip_errors import (
     ANGLE,
     CELL_METRICS,
+    COVERAGES,
     SILENT_ANGLE,
     ClipErrors,
     ErrorsByCondition,
@@ -25,6 +26,8 @@ from harness.bench.accuracy.conditions import (
     refuse_lag,
     with_lag,
 )
+from harness.bench.accuracy.setup_targets import evaluate_setups
+from harness.bench.accuracy.setups import plan_setups, setup_of
 from harness.bench.accuracy.statements import compare_methods, find_worse_clips, rank_pooled
 from harness.bench.accuracy.targets import LAGGED_CONDITION, evaluate_lag, evaluate_targets
 from harness.bench.common import fresh_methods, run_benchmark_cells
@@ -37,6 +40,9 @@ from harness.results import cell_folder, current_circumstances, read_cell
 from harness.results.findings import BenchmarkStatement
 
 _QUICK = "the quick form has one seed and few clips"
+Table = Literal["presets", "setups"]
+TABLES: tuple[Table, ...] = get_args(Table)
+"""Parts of the benchmark: the noise presets of the accuracy tables, and the set-ups."""
 
 
 @dataclass(frozen=True)
@@ -70,21 +76,29 @@ def measure_accuracy(
     stored: StoredErrors,
     out: Path,
     *,
+    references: Sequence[StoredErrors] = (),
+    tables: Collection[Table] = TABLES,
     seeds: Sequence[int] = SEEDS,
     quick: bool = False,
     **options: Any,
 ) -> AccuracyReport:
     """Run or resume the cells in `out`, and compare `method` with the stored errors and today's other methods.
 
-    `options` are those of `run_benchmark_cells`, whose errors are raised. BadInput for a method that is not causal, and
-    when clips or seeds differ from the stored ones.
+    `references` are the errors of several methods of one commit that the set-ups are compared with. The quick form has
+    no set-ups. `options` are those of `run_benchmark_cells`, whose errors are raised. BadInput for a method that is not
+    causal, and when clips or seeds differ from the stored ones.
     """
     refuse_lag(method)
     seeds = seeds[:1] if quick else seeds
     earlier = stored.first_seeds(seeds)
+    by_reference = {one.method: one.first_seeds(seeds) for one in references}
     with fresh_methods():
-        scenarios = plan_scenarios(quick_conditions() if quick else CONDITIONS, method, seeds, quick=quick)
-        lagged, no_lag = _plan_supported_lag(method, seeds, quick)
+        scenarios, lagged, no_lag = list[Scenario](), list[Scenario](), ""
+        if "presets" in tables:
+            scenarios = plan_scenarios(quick_conditions() if quick else CONDITIONS, method, seeds, quick=quick)
+            lagged, no_lag = _plan_supported_lag(method, seeds, quick)
+        if "setups" in tables and not quick:
+            scenarios = [*scenarios, *plan_setups([method], seeds)]
         results = run_benchmark_cells("accuracy", [*scenarios, *lagged], out, **options)
     if results.failures:
         return AccuracyReport(method, stored.title, quick, results.failures)
@@ -92,12 +106,16 @@ def measure_accuracy(
     later = by_method.pop(with_lag(method), {}).get(LAGGED_CONDITION, {})
     if quick:
         earlier = _same_clips(earlier, by_method[method])
-    statements = [
-        *evaluate_targets(earlier, by_method[method]),
-        *(evaluate_lag(with_lag(method), later, earlier.get(LAGGED_CONDITION, {})) if later else ()),
-        *compare_methods(method, by_method),
-        *find_worse_clips(method, by_method, stored.title, earlier),
-    ]
+    statements = list[BenchmarkStatement]()
+    if "presets" in tables:
+        statements = [
+            *evaluate_targets(earlier, by_method[method]),
+            *(evaluate_lag(with_lag(method), later, earlier.get(LAGGED_CONDITION, {})) if later else ()),
+            *compare_methods(method, by_method),
+            *find_worse_clips(method, by_method, stored.title, earlier),
+        ]
+    if by_reference:
+        statements += evaluate_setups(method, by_method[method], by_reference, references[0].commit)
     if quick:
         statements = [replace(statement, verdict="no verdict", why=_QUICK) for statement in statements]
     rankings = rank_pooled(by_method)
@@ -154,13 +172,14 @@ def collect_errors(rows: Iterable[Mapping[str, Any]], out: Path) -> dict[str, Er
 
 def condition_of(row: Mapping[str, Any]) -> Condition:
     """The condition of a cell's row; cells with later frames have the condition of those without."""
-    scenario = "boxing" if row["scenario"] == "boxing_lagged" else row["scenario"]
-    return Condition(scenario, row["noise"], row["inputs"], row["varied"].get("disturbance.station", ""))
+    scenario, setup = setup_of("boxing" if row["scenario"] == "boxing_lagged" else row["scenario"])
+    return Condition(scenario, row["noise"], row["inputs"], row["varied"].get("disturbance.station", ""), setup)
 
 
 def _clip_errors(rows: Sequence[Mapping[str, Any]], out: Path) -> ClipErrors:
     rows = sorted(rows, key=lambda row: int(row["seed"]))
-    by_metric: dict[str, tuple[float | None, ...]] = {name: tuple(row[name] for row in rows) for name in CELL_METRICS}
+    names = (*CELL_METRICS, *(name for name in COVERAGES if rows[0].get(name) is not None))
+    by_metric: dict[str, tuple[float | None, ...]] = {name: tuple(row[name] for row in rows) for name in names}
     if "disturbance.station" in rows[0]["varied"]:
         by_metric[SILENT_ANGLE] = tuple(_silent_angle_deg(cell_folder(out, row["key"])) for row in rows)
     return ClipErrors(rows[0]["behaviour"], rows[0]["performer"], by_metric)

@@ -33,7 +33,7 @@ def _sections(report: AccuracyReport) -> Iterator[str]:
 def _motion_table(report: AccuracyReport) -> Table:
     """Position, jitter over the truth's, and foot skate by condition, of the stored errors and of today's."""
     head = ["condition", "method", "position [mm]", "jitter/truth", "foot skate [mm/s]", "truth's"]
-    today = report.by_method[report.method]
+    today = {name: by_clip for name, by_clip in report.by_method[report.method].items() if name in report.stored}
     sides = {report.stored_title: report.stored, report.method: today}
     rows = [
         [condition, name, *_motion_cells(errors, condition)] for condition in today for name, errors in sides.items()

@@ -149,7 +149,7 @@ def test_without_real_motion_it_is_refused_and_nothing_is_written(
 ) -> None:
     monkeypatch.delenv("HARNESS_MOCAP", raising=False)
     monkeypatch.chdir(tmp_path)
-    captured = command("bench", "accuracy", "--baseline", BASELINE, code=Outcome.REFUSED.exit_code)
+    captured = command("bench", "accuracy", "--only", "presets", "--baseline", BASELINE, code=Outcome.REFUSED.exit_code)
     assert "--mocap" in captured.err
     assert captured.out.splitlines()[-1] == "refused"
     assert not list(tmp_path.iterdir())
@@ -164,6 +164,7 @@ def test_without_real_motion_it_is_refused_and_nothing_is_written(
         (["accuracy", "--seed", "2"], "--seed with accuracy"),
         (["accuracy", "--seeds", "6"], "there are 5 seeds"),
         (["accuracy", "--quick", "--save", "x.json"], "--quick has one seed"),
+        (["accuracy", "--quick", "--only", "setups"], "and no set-ups"),
         (["accuracy", "--baseline", "none.json"], "none.json"),
     ],
 )
@@ -181,7 +182,7 @@ def test_errors_of_code_without_a_commit_are_not_saved(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(measurement, "current_circumstances", lambda: code)
     monkeypatch.delenv("HARNESS_MOCAP", raising=False)
-    words = ["bench", "accuracy", "--baseline", str(BASELINE), "--save", "never.json"]
+    words = ["bench", "accuracy", "--only", "presets", "--baseline", str(BASELINE), "--save", "never.json"]
     assert named in command(*words, code=Outcome.REFUSED.exit_code).err
 
 
@@ -192,7 +193,8 @@ def test_saved_errors_are_those_of_the_method_and_its_commit(
     monkeypatch.setattr(measurement, "current_circumstances", lambda: {"commit": COMMIT, "dirty": False})
     monkeypatch.setattr(measurement, "measure_accuracy", lambda *_, **__: measured)
     monkeypatch.chdir(tmp_path)
-    words = ["bench", "accuracy", "--baseline", str(BASELINE), "--method", "ours", "--save", "mine.json"]
+    words = ["bench", "accuracy", "--only", "presets", "--baseline", str(BASELINE)]
+    words += ["--method", "ours", "--save", "mine.json"]
     command(*words)
     found = read_errors(tmp_path / "mine.json")
     assert (found.method, found.commit, found.seeds) == ("ours", COMMIT, SEEDS)
