@@ -17,6 +17,8 @@ from harness.reconstruct.solver.kinematic_tree import forward_kinematics_batch, 
 
 _SAMPLE = 4096
 """Largest number of frames that are used, evenly spaced."""
+_LEAST_DEVIATION = 0.01
+"""Floor of the deviations of other performers [m; rad]."""
 
 
 def mean_posture(body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> Floats:
@@ -52,6 +54,27 @@ def scaled_spread_rad(
     spread = np.maximum(spread_rad(body, examples, centre), least_rad)
     out: Floats = rms_rad * (spread / np.sqrt(np.mean(spread**2)))
     return out
+
+
+def posture_of_others(database: MotionDatabase) -> tuple[Floats, Floats]:
+    """Mean (52,) posture of the performers, and the mean squared deviation (52,) of each from the mean of the others.
+
+    Performers count by the square root of their frames. With one performer the deviation is that from his own mean.
+    """
+    sums: dict[str, list[Floats]] = {}
+    for run in database.segments:
+        posture = database.posture[run.start : run.stop].astype(float)
+        found = np.stack([np.ones(posture.shape[1]) * len(posture), posture.sum(axis=0), (posture**2).sum(axis=0)])
+        sums.setdefault(run.subject, []).append(found)
+    database.release_memory()
+    frames, total, squares = np.moveaxis([np.sum(parts, axis=0) for parts in sums.values()], 1, 0)
+    means, weights = total / frames, np.sqrt(frames)
+    mean = np.sum(weights * means, axis=0) / weights.sum(axis=0)
+    others = mean
+    if len(means) > 1:
+        others = (np.sum(weights * means, axis=0) - weights * means) / (weights.sum(axis=0) - weights)
+    deviation = squares / frames - 2.0 * others * means + others**2
+    return mean, np.sum(weights * deviation, axis=0) / weights.sum(axis=0) + _LEAST_DEVIATION**2
 
 
 def _principal_angles(limits: HingeLimits, examples: Sequence[BodyMotion] | MotionDatabase) -> Iterator[Floats]:

@@ -4,9 +4,10 @@ For every frame:
 
 1. Bring the readings of all stations to one instant (`temporal_alignment`).
 2. Put two Gaussians of the posture together from tabulated moments of the examples (`local_experts`): one given the
-   readings and the last poses, one given the last poses alone. Multiply them by terms of contact (`floor_contact`).
+   readings and the last poses, one given the last poses alone. Multiply them by a broad Gaussian for new performers,
+   and by terms of contact (`floor_contact`).
 3. Solve for the pose that maximises the product of both and of the likelihood of the readings, by Levenberg-Marquardt.
-4. Update the scales of the readings' noise and of the prior from the residuals (`self_calibration`).
+4. Update the scales of the readings' noise and the trust in the experts from the residuals (`self_calibration`).
 
 Sources: Liu et al. 2011 (prediction times likelihood), Hinton 2002 (product of experts), Atkeson, Moore and Schaal 1997
 (locally weighted regression). docs/methods.md has the formulas, the constants and the clips that chose them.
@@ -29,7 +30,12 @@ from harness.reconstruct.contract import CalibrationCache, Session
 from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.local_experts import LocalExperts
 from harness.reconstruct.features.moment_table import condition, local_gaussian
-from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad, toe_height_m
+from harness.reconstruct.features.posture_statistics import (
+    mean_posture,
+    posture_of_others,
+    spread_rad,
+    toe_height_m,
+)
 from harness.reconstruct.features.predictor_query import PredictorQuery
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
 from harness.reconstruct.methods.window_method import DatabaseLearner, WindowExamples
@@ -48,7 +54,7 @@ from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, Solve
 from harness.reconstruct.solver.ik_solver import IKSolution
 from harness.reconstruct.solver.matrix_algebra import invert_positive_definite
 from harness.reconstruct.solver.root_placement import candidate_placements
-from harness.reconstruct.solver.self_calibration import LossScale, SelfCalibration, posterior
+from harness.reconstruct.solver.self_calibration import LossScale, SelfCalibration, Trust, posterior
 from harness.reconstruct.solver.subspace import SubspaceSolver
 from harness.reconstruct.solver.subspace_minimiser import Subspace
 from harness.stream import TrackerFrame
@@ -90,9 +96,8 @@ class ExpertMap(DatabaseLearner["FittedExpertMap"]):
     """Variance of the weights over the squared distance within which half of the K examples lie."""
     history_weight: Annotated[float, Range(0.0, 1e3)] = 0.5
     """Power of the expert of the history in the product; 0 leaves it out."""
-    widening: Annotated[float, Range(0.0, 1e6)] = 130.0
-    """For performers unlike the examples, the covariance grows by f = 1 + (widening d^2)^2, where d is the RMS
-    distance of the nearest examples per feature; the prior of `ik` takes part with the weight 1 - 1/f."""
+    broad_weight: Annotated[float, Range(0.0, 1e3)] = 0.15
+    """Power of the broad Gaussian of other performers' postures in the product, for a performer unlike the examples."""
     align: bool = True
     """Move the readings of all stations to one instant."""
     lag: Annotated[int, Range(0, 2)] = 0
@@ -104,7 +109,8 @@ class ExpertMap(DatabaseLearner["FittedExpertMap"]):
         """Learn from a database, which may lie on disk."""
         examples = WindowExamples.learn(body, database, POSES)
         least_sigma_rad = _SPREAD_SHARE * spread_rad(body, database, mean_posture(body, database))
-        return FittedExpertMap(self, examples, toe_height_m(body, database), least_sigma_rad)
+        broad = posture_of_others(database)
+        return FittedExpertMap(self, examples, toe_height_m(body, database), least_sigma_rad, broad)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +123,8 @@ class FittedExpertMap:
     """Height of a toe on the floor [m]."""
     least_sigma_rad: Floats
     """(48,) part of the stated standard deviation of each hinge that does not depend on the frame [rad]."""
+    broad: tuple[Floats, Floats]
+    """Mean (52,) and variance (52,) of the posture of a performer whom the examples lack."""
     _cache: CalibrationCache[tuple[ReducedRankRegression, dict[int, LocalExperts]]] = field(
         default_factory=CalibrationCache
     )
@@ -153,7 +161,7 @@ class ExpertMapSession(HistorySession):
             *(examples.body, calibration, solver_options, examples.mean_prior, examples.increments.moments),
             *(POSES, rate_hz),
         )
-        self._options, self._ik_prior, self._made = options, examples.ik_prior, experts
+        self._options, self._broad, self._made = options, fitted.broad, experts
         self._least_sigma_rad = fitted.least_sigma_rad
         self._query = PredictorQuery(regression, self.residuals)
         self._experts = experts[id(regression)]
@@ -161,7 +169,9 @@ class ExpertMapSession(HistorySession):
         self._no_noise = np.zeros((self._experts.history_axes.shape[1],) * 2)
         self._contact = FloorContact(examples.body, self.residuals, fitted.floor_m, rate_hz)
         self._scales = SelfCalibration(loss.position_sigma_m, loss.orientation_sigma_rad)
-        self._loss_scale = LossScale(loss.position_scale_m, rate_hz)
+        self._loss_scale, self._trust = LossScale(loss.position_scale_m, rate_hz), Trust(rate_hz)
+        self._product: Gaussian
+        """Mean (P,) and precision (P, P) of the product of the experts."""
         self._prior: Subspace | None = None
         """Prior of the pose that was solved last; None when inverse kinematics answered."""
         self._angle_sigma_rad: Floats = np.full(48, POSTURE_PRIOR_SIGMA_RAD)
@@ -216,10 +226,11 @@ class ExpertMapSession(HistorySession):
         residuals, prior = self.residuals, self._prior
         residuals.evaluate(self.qpos)
         z = ground_and_posture(self.qpos)
-        found = posterior(residuals.tree, residuals.targets, residuals.state, prior, z)
+        found = posterior(residuals.tree, residuals.targets, residuals.state, prior, self._product, z)
         self._angle_sigma_rad = np.hypot(np.sqrt(found.variance[HINGES]), self._least_sigma_rad)
         if not cold:
             self._scales.update(found)
+            self._trust.update(found)
             if not residuals.variance.any():
                 self._loss_scale.update(residuals.targets, residuals.state)
 
@@ -228,14 +239,14 @@ class ExpertMapSession(HistorySession):
         return _extrapolate_ground(self.past[0], self.past[1])
 
     def _predict(self, history: bool) -> Subspace:
-        """The product of the experts, of contact with the floor and, far from the examples, of the prior of `ik`."""
+        """The product of the experts, of contact with the floor and, for new performers, of the broad Gaussian."""
         options, query = self._options, self._query
         if query.prepare(history):
             regression = query.regression
             if id(regression) not in self._made:
                 self._made[id(regression)] = LocalExperts(regression)
             self._experts = self._made[id(regression)]
-        experts, scales = self._experts, self._scales
+        experts, scales, trust = self._experts, self._scales, self._trust
         predictors = query.predictors(self.past)
         to_z = experts.feature_map(self.residuals.measured, history)
         sigma = scales.position_sigma_m, scales.orientation_sigma_rad
@@ -244,27 +255,24 @@ class ExpertMapSession(HistorySession):
         local = local_gaussian(experts.table, z, options.neighbours, options.width)
         mean, covariance = condition(local, z, noise, _RIDGE)
         mean[HINGES] = self.limits.clip(mean[HINGES])
-        widened = 1.0 + (options.widening * local.nearest / len(z)) ** 2
-        other, weight = (mean, covariance), 0.0
+        other, power = (mean, covariance), 0.0
         if history and options.history_weight > 0.0:
             u = predictors[: len(experts.history_axes)] @ experts.history_axes - experts.history_origin
             around = local_gaussian(experts.history_table, u, options.history_neighbours, _HISTORY_WIDTH)
             other = condition(around, u, self._no_noise, _HISTORY_RIDGE)
-            weight = options.history_weight / math.sqrt(widened)
-        precision, linear = self._ik_terms(mean, 1.0 - 1.0 / widened)
-        expert, factor, power = (mean, covariance), widened * scales.prior, weight / scales.prior
-        prior = _product(expert, factor, other, power, precision, linear)
-        return self._contact.constrain(prior, history)
+            power = options.history_weight / math.sqrt(trust.inflation)
+        self._product = _multiply((mean, covariance), trust.inflation, other, power)
+        return self._contact.constrain(self._multiply_broad(self._product), history)
 
-    def _ik_terms(self, mean: Floats, weight: float) -> tuple[Floats, Floats]:
-        """Precision (P,) of the prior of `ik` with a weight, and its pull (P,) away from `mean`."""
-        by_ik = self._ik_prior.prior(self.limits, self.past[0])
-        if by_ik.precision is None:
-            raise ValueError("The prior of inverse kinematics has no precision.")
-        precision, linear = np.zeros(POSTURE_SIZE), np.zeros(POSTURE_SIZE)
-        precision[HINGES] = weight * by_ik.precision[6:]
-        linear[HINGES] = precision[HINGES] * (by_ik.qpos[7:] - mean[HINGES])
-        return precision, linear
+    def _multiply_broad(self, product: Gaussian) -> Subspace:
+        """The product of the experts (mean (P,), precision (P, P)) with the broad Gaussian, by the share of newness."""
+        mean, precision = product
+        weight = self._options.broad_weight * self._trust.newness
+        if weight > 0.0:
+            broad_mean, broad_variance = self._broad
+            mean, precision = add_independent(mean, precision, broad_mean, weight / broad_variance)
+        none = np.zeros(POSTURE_SIZE)
+        return Subspace(mean, np.zeros((0, POSTURE_SIZE)), precision, none, none)
 
 
 @compiled
@@ -278,28 +286,34 @@ def _extrapolate_ground(newest: Floats, before: Floats) -> Floats:
 
 
 @compiled
-def _product(
-    expert: Gaussian, factor: float, other: Gaussian, weight: float, precision: Floats, linear: Floats
-) -> Subspace:
-    """The prior: two experts, the second with a power, and independent terms of each number, linear about `mean`.
+def _multiply(expert: Gaussian, inflation: float, other: Gaussian, power: float) -> Gaussian:
+    """Mean (P,) and precision (P, P) of the product of an inflated Gaussian with a power of another.
 
     The covariances (P, P) are overwritten.
     """
     mean, covariance = expert
     other_mean, other_covariance = other
-    size = len(mean)
     _add_floor(covariance, 0.0)
-    covariance *= factor
-    curvature = invert_positive_definite(covariance)
-    if weight > 0.0:
+    covariance *= inflation
+    precision = invert_positive_definite(covariance)
+    if power > 0.0:
         _add_floor(other_covariance, _HISTORY_SIGMA_RAD**2)
         inverse = invert_positive_definite(other_covariance)
-        linear = linear + weight * np.dot(inverse, other_mean - mean)
-        curvature += weight * inverse
-    for i in range(size):
-        curvature[i, i] += precision[i]
-    most_likely = mean + np.linalg.solve(curvature, linear)
-    return Subspace(most_likely, np.zeros((0, size)), curvature, np.zeros(size), np.zeros(size))
+        precision += power * inverse
+        mean = mean + np.linalg.solve(precision, power * np.dot(inverse, other_mean - mean))
+    return mean, precision
+
+
+@compiled
+def add_independent(mean: Floats, precision: Floats, other: Floats, added: Floats) -> Gaussian:
+    """Mean and precision of the product of a Gaussian with another one of independent numbers.
+
+    `other` (P,) is its mean and `added` (P,) its precision.
+    """
+    total = precision.copy()
+    for i in range(len(mean)):
+        total[i, i] += added[i]
+    return mean + np.linalg.solve(total, added * (other - mean)), total
 
 
 @compiled

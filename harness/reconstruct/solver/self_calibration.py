@@ -2,8 +2,12 @@
 
 After each solve the expected squares of the whitened residuals are compared with their number. By expectation
 maximisation (Dempster, Laird and Rubin 1977; for a filter: Shumway and Stoffer 1982) the expected square of a residual
-is its square at the solution plus the share of the posterior's variance along it. A scale then moves towards the ratio
-by a small power, so that it follows slowly.
+is its square at the solution plus the share of the posterior's variance along it. A scale of the noise then moves
+towards the ratio by a small power, so that it follows slowly.
+
+The scale of the prior is the ratio of two running means: of the squared distance of the solution from the prior's mean,
+and of the information that the readings have about the posture. Its expectation is 1 for a prior that errs as much as
+it says, whatever prior was used for the solution. It tells new performers from known ones (`Trust`).
 
 The Lorentzian's scale for positions follows the residuals that a session usually has. A position that is off by 5 to
 30 mm for seconds (`Excursion`) has the square's full weight under a scale of 30 mm, and little under one of a few
@@ -28,14 +32,20 @@ _MIN_DIAGONAL = 1e-6
 """Added to the diagonal of the normal equations, for a ground frame that no reading determines."""
 _MAX_SQUARE = 30.0
 """Limit of a whitened square, so that outliers do not count as noise."""
-_NOISE_RATE, _PRIOR_RATE = 0.1, 0.1
-"""Powers of the ratios by which the standard deviations of the noise and the prior's variance move in a frame."""
-_PRIOR_FREEDOM = 36.0
-"""Number of directions whose squares the prior's ratio is taken over: a smaller one reacts more."""
+_NOISE_RATE = 0.1
+"""Power of the ratio by which the standard deviations of the noise move in a frame."""
 _MIN_NOISE, _MAX_NOISE = 0.1, 0.8
 """Limits of the standard deviations of the noise, as shares of those of the loss."""
-_MIN_PRIOR, _MAX_PRIOR = 0.5, 100.0
-"""Limits of the factor on the prior's covariance."""
+_MIN_SCALE, _MAX_SCALE = 0.3, 100.0
+"""Limits of the estimated scale of the experts' covariance."""
+_INFLATION = 3.0
+"""Factor on the experts' covariance over their estimated scale: no reading shows the other directions' errors."""
+_SCALE_S, _KIND_S = 0.25, 1.0
+"""Time constants of the scale, and of the one that tells known from new performers [s]."""
+_FIRST_INFORMATION = 36.0
+"""Information that the running means begin with, at a scale of 1."""
+_KNOWN, _NEW = 10.0**-0.1, 10.0**0.4
+"""Scales up to which a performer is known, and from which on he is new."""
 _MULTIPLE = 6.0
 """The scale over the usual median distance."""
 _MIN_SCALE_M = 0.005
@@ -53,17 +63,26 @@ class Posterior(NamedTuple):
     """Mean expected whitened square of the measured positions' components."""
     orientation: float
     """Mean expected whitened square of the measured orientations' components."""
-    prior: float
-    """Expected squared Mahalanobis distance from the prior's mean, less its number of directions."""
+    distance: float
+    """Squared Mahalanobis distance of the posture from the experts' mean."""
+    information: float
+    """Trace of the share of the posterior's precision that the readings have: the expectation of `distance` for experts
+    that err as much as they say."""
 
 
 @compiled
 def posterior(
-    tree: KinematicTree, targets: StationTargets, state: KinematicState, prior: Subspace, z: Floats
+    tree: KinematicTree,
+    targets: StationTargets,
+    state: KinematicState,
+    prior: Subspace,
+    experts: tuple[Floats, Floats],
+    z: Floats,
 ) -> Posterior:
     """The posterior at a solution z (3 + P,), for which `state` is evaluated: Laplace's approximation.
 
-    The prior is a Gaussian about its mean: its linear term is 0.
+    The prior is a Gaussian about its mean: its linear term is 0. `experts` are the mean (P,) and the precision (P, P)
+    of the part of the prior whose distance is measured.
     """
     count, size = len(tree.station_body), len(z)
     rows, descent = np.empty(tree.ancestors.shape), np.empty(len(tree.depth))
@@ -89,13 +108,14 @@ def posterior(
     by_orientations = size - by_positions - by_prior - by_nothing
     squares, numbers = np.zeros(2), np.zeros(2)
     for row in range(2 * count):
-        precision = targets.precision[row]
-        if precision > 0.0:
+        inverse = targets.precision[row]
+        if inverse > 0.0:
             kind = 0 if row < count else 1
-            squares[kind] += min(precision * state.squared[row], _MAX_SQUARE)
+            squares[kind] += min(inverse * state.squared[row], _MAX_SQUARE)
             numbers[kind] += 3.0
-    offset = z[3:] - prior.mean
-    away = np.dot(offset, np.dot(prior.curvature, offset))
+    mean, precision = experts
+    offset = z[3:] - mean
+    distance = np.dot(offset, np.dot(precision, offset))
     variance = np.empty(size - 3)
     for i in range(3, size):
         variance[i - 3] = covariance[i, i]
@@ -103,27 +123,46 @@ def posterior(
         variance,
         (squares[0] + by_positions) / max(numbers[0], 1.0) if numbers[0] > 0.0 else 1.0,
         (squares[1] + by_orientations) / max(numbers[1], 1.0) if numbers[1] > 0.0 else 1.0,
-        away + by_prior - (size - 3),
+        distance,
+        size - 3 - by_prior,
     )
 
 
 class SelfCalibration:
-    """Scales of one session."""
+    """Standard deviations of the readings of one session."""
 
     def __init__(self, position_sigma_m: float, orientation_sigma_rad: float) -> None:
         self._nominal = position_sigma_m, orientation_sigma_rad
         self.position_sigma_m, self.orientation_sigma_rad = self._nominal
         """Standard deviations of the readings [m], [rad]."""
-        self.prior = 1.0
-        """Factor on the prior's covariance."""
 
     def update(self, found: Posterior) -> None:
         """Take the posterior of one frame."""
         position_m, orientation_rad = self._nominal
         self.position_sigma_m = _moved(self.position_sigma_m, found.position, position_m)
         self.orientation_sigma_rad = _moved(self.orientation_sigma_rad, found.orientation, orientation_rad)
-        ratio = max(found.prior / _PRIOR_FREEDOM + 1.0, 1e-3)
-        self.prior = min(max(self.prior * math.pow(ratio, _PRIOR_RATE), _MIN_PRIOR), _MAX_PRIOR)
+
+
+class Trust:
+    """How far one session trusts its experts."""
+
+    def __init__(self, rate_hz: float) -> None:
+        """`rate_hz` is that of the frames."""
+        self._weights = np.minimum(1.0, 1.0 / (np.array([_SCALE_S, _KIND_S]) * rate_hz))
+        self._distance, self._information = np.full(2, _FIRST_INFORMATION), np.full(2, _FIRST_INFORMATION)
+        self.inflation = _INFLATION
+        """Factor on the experts' covariance."""
+        self.newness = 0.0
+        """Share by which the performer is unlike the examples: 0 known, 1 new."""
+
+    def update(self, found: Posterior) -> None:
+        """Take the posterior of one frame, whose experts had the present inflation."""
+        self._distance += self._weights * (self.inflation * found.distance - self._distance)
+        self._information += self._weights * (max(found.information, 0.0) - self._information)
+        scale, kind = np.clip(self._distance / np.maximum(self._information, 1e-3), _MIN_SCALE, _MAX_SCALE)
+        self.inflation = _INFLATION * float(scale)
+        share = math.log(kind / _KNOWN) / math.log(_NEW / _KNOWN)
+        self.newness = min(max(share, 0.0), 1.0)
 
 
 def _moved(sigma: float, ratio: float, nominal: float) -> float:
