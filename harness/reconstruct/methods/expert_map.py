@@ -30,12 +30,7 @@ from harness.reconstruct.contract import CalibrationCache, Session
 from harness.reconstruct.database.motion_database import MotionDatabase
 from harness.reconstruct.features.local_experts import LocalExperts
 from harness.reconstruct.features.moment_table import condition, local_gaussian
-from harness.reconstruct.features.posture_statistics import (
-    mean_posture,
-    posture_of_others,
-    spread_rad,
-    toe_height_m,
-)
+from harness.reconstruct.features.posture_statistics import posture_of_others, toe_height_m
 from harness.reconstruct.features.predictor_query import PredictorQuery
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
 from harness.reconstruct.methods.window_method import DatabaseLearner, WindowExamples
@@ -67,9 +62,11 @@ _RIDGE = 1e-4
 """Ridge of the expert of readings and history, as a share of the features' variance."""
 _HISTORY_RIDGE, _HISTORY_WIDTH, _HISTORY_SIGMA_RAD = 0.1, 1.0, math.radians(6.0)
 """Ridge and width of the expert of the history, and a further standard deviation of every hinge under it."""
-_SPREAD_SHARE = 0.06
-"""Share of a hinge's spread over the examples that joins the stated standard deviations. Performers differ by it in
-hinges that no station shows, also where neighbouring examples agree."""
+_STATED_AT_36, _STATED_POWER = 0.92, 0.4
+"""Stated standard deviations over those of the posterior, for the 36 numbers of six stations; and the power by which
+the factor grows with fewer numbers. The posterior is too narrow in hinges that no station shows."""
+_STATED_BY_CALIBRATION = {"tpose": 1.5}
+"""Further factor of calibrations whose mounts err."""
 FEATURES = 32
 """Number of features of readings and history."""
 
@@ -108,9 +105,7 @@ class ExpertMap(DatabaseLearner["FittedExpertMap"]):
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedExpertMap":
         """Learn from a database, which may lie on disk."""
         examples = WindowExamples.learn(body, database, POSES)
-        least_sigma_rad = _SPREAD_SHARE * spread_rad(body, database, mean_posture(body, database))
-        broad = posture_of_others(database)
-        return FittedExpertMap(self, examples, toe_height_m(body, database), least_sigma_rad, broad)
+        return FittedExpertMap(self, examples, toe_height_m(body, database), posture_of_others(database))
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +116,6 @@ class FittedExpertMap:
     examples: WindowExamples
     floor_m: float
     """Height of a toe on the floor [m]."""
-    least_sigma_rad: Floats
-    """(48,) part of the stated standard deviation of each hinge that does not depend on the frame [rad]."""
     broad: tuple[Floats, Floats]
     """Mean (52,) and variance (52,) of the posture of a performer whom the examples lack."""
     _cache: CalibrationCache[tuple[ReducedRankRegression, dict[int, LocalExperts]]] = field(
@@ -162,7 +155,7 @@ class ExpertMapSession(HistorySession):
             *(POSES, rate_hz),
         )
         self._options, self._broad, self._made = options, fitted.broad, experts
-        self._least_sigma_rad = fitted.least_sigma_rad
+        self._stated = _STATED_BY_CALIBRATION.get(calibration.kind, 1.0)
         self._query = PredictorQuery(regression, self.residuals)
         self._experts = experts[id(regression)]
         self._solver = SubspaceSolver(self.residuals, self.limits, solver_options.stopping)
@@ -227,12 +220,17 @@ class ExpertMapSession(HistorySession):
         residuals.evaluate(self.qpos)
         z = ground_and_posture(self.qpos)
         found = posterior(residuals.tree, residuals.targets, residuals.state, prior, self._product, z)
-        self._angle_sigma_rad = np.hypot(np.sqrt(found.variance[HINGES]), self._least_sigma_rad)
+        self._angle_sigma_rad = self._stated_factor() * np.sqrt(found.variance[HINGES])
         if not cold:
             self._scales.update(found)
             self._trust.update(found)
             if not residuals.variance.any():
                 self._loss_scale.update(residuals.targets, residuals.state)
+
+    def _stated_factor(self) -> float:
+        """Stated standard deviations over those of the posterior, for the readings that the session has had."""
+        numbers = 3 * max(int(self._query.usual.sum()), 1)
+        return self._stated * _STATED_AT_36 * math.pow(36.0 / numbers, _STATED_POWER)
 
     def _next_ground(self) -> Floats:
         """Ground frame (3,) after the last two, at the same speed."""
