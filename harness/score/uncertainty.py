@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats, freeze
+from harness.core.estimate import HALF_WIDTH_95
 from harness.core.humanoid24 import QPOS_OF_DOF, unpack
 from harness.errors import ShapeError
 from harness.score.angles import wrap_difference
@@ -19,6 +20,10 @@ SIGMA_DEFINITIONS: dict[str, Definition] = {
     ),
     "sigma_coverage_2": Definition(
         "share", "frames and hinges whose error lies within two stated standard deviations; 0.954 for a normal error"
+    ),
+    "sigma_coverage_95": Definition(
+        "share",
+        "frames and hinges whose error lies within the stated 95 % region, 2.66 standard deviations (Student's t)",
     ),
     "sigma_lowest_coverage_1": Definition("share", "the lowest `sigma_coverage_1` of any one hinge"),
     "sigma_width_deg": Definition("deg", "mean stated standard deviation of the hinge angles"),
@@ -38,19 +43,22 @@ class SigmaSums:
     """(D,) number of frames whose error lies within one standard deviation."""
     within_2: Floats
     """(D,) number of frames whose error lies within two standard deviations."""
+    within_95: Floats
+    """(D,) number of frames whose error lies within the stated 95 % region."""
     sigma_deg: Floats
     """(D,) sum of the standard deviations [deg]."""
     log_score: Floats
     """(D,) sum of the negative log densities of the true angle, per degree [nat]."""
 
     def __post_init__(self) -> None:
-        freeze(self, within_1=("D",), within_2=("D",), sigma_deg=("D",), log_score=("D",))
+        freeze(self, within_1=("D",), within_2=("D",), within_95=("D",), sigma_deg=("D",), log_score=("D",))
 
     def __add__(self, other: "SigmaSums") -> "SigmaSums":
         return SigmaSums(
             self.frames + other.frames,
             self.within_1 + other.within_1,
             self.within_2 + other.within_2,
+            self.within_95 + other.within_95,
             self.sigma_deg + other.sigma_deg,
             self.log_score + other.log_score,
         )
@@ -74,6 +82,7 @@ class SigmaSums:
         sums = {
             "sigma_coverage_1": self.within_1,
             "sigma_coverage_2": self.within_2,
+            "sigma_coverage_95": self.within_95,
             "sigma_width_deg": self.sigma_deg,
             "sigma_log_score": self.log_score,
         }
@@ -106,6 +115,7 @@ def sum_sigma(error_deg: Floats, sigma_deg: Floats) -> SigmaSums:
         len(error_deg),
         np.count_nonzero(share <= 1.0, axis=0).astype(float),
         np.count_nonzero(share <= 2.0, axis=0).astype(float),
+        np.count_nonzero(share <= HALF_WIDTH_95, axis=0).astype(float),
         sigma_deg.sum(axis=0),
         log_score.sum(axis=0),
     )

@@ -137,7 +137,7 @@ def test_a_recording_is_scored_at_the_frames_that_are_answered(tmp_path: Path, p
     assert late.sigma_scores == pytest.approx(prompt.sigma_scores, rel=0.05)
     text = format_score_table([late, prompt])
     assert f"{LATE} (lag 2)" in text
-    assert "within 2 sigma [%]" in text
+    assert "within 95 % region [%]" in text
 
 
 def answers_of(frames: int, **options: Any) -> MethodAnswers:

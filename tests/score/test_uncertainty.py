@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.stats import t as student_t
 
 from harness.core.arrays import Floats
+from harness.core.estimate import HALF_WIDTH_95, SIGMA_FREEDOM
 from harness.core.humanoid24 import pack, standard_skeleton, unpack
 from harness.errors import ShapeError
 from harness.score.uncertainty import SIGMA_DEFINITIONS, sum_sigma
@@ -18,6 +20,7 @@ def test_scores_by_hand() -> None:
     assert set(scores) == set(SIGMA_DEFINITIONS)
     assert scores["sigma_coverage_1"] == pytest.approx(3 / 6)
     assert scores["sigma_coverage_2"] == pytest.approx(5 / 6)
+    assert scores["sigma_coverage_95"] == pytest.approx(6 / 6)
     assert scores["sigma_lowest_coverage_1"] == pytest.approx(1 / 3)
     assert scores["sigma_width_deg"] == pytest.approx(12.5 / 6)
     expected = [np.log(s * np.sqrt(2 * np.pi)) + e**2 / (2 * s**2) for e, s in zip(error_deg.flat, sigma_deg.flat)]  # noqa: B905
@@ -40,6 +43,14 @@ def test_normal_errors_have_the_shares_of_a_normal_distribution(rng: np.random.G
     assert scores["sigma_coverage_2"] == pytest.approx(0.9545, abs=0.005)
     for factor in (0.7, 1.4):
         assert sum_sigma(error_deg, factor * sigma_deg).scores()["sigma_log_score"] > scores["sigma_log_score"]
+
+
+def test_the_region_of_95_percent_is_that_of_students_t(rng: np.random.Generator) -> None:
+    of = student_t(SIGMA_FREEDOM)
+    assert of.ppf(0.975) / of.ppf(0.5 + 0.5 * 0.6827) == pytest.approx(HALF_WIDTH_95, abs=1e-3)
+    error_deg = np.abs(rng.standard_t(SIGMA_FREEDOM, (20_000, 4)))
+    scores = sum_sigma(error_deg, np.full(error_deg.shape, of.ppf(0.5 + 0.5 * 0.6827))).scores()
+    assert (scores["sigma_coverage_1"], scores["sigma_coverage_95"]) == pytest.approx((0.6827, 0.95), abs=0.005)
 
 
 def test_nothing_is_scored_without_frames() -> None:

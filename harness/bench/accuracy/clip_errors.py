@@ -26,8 +26,8 @@ CELL_METRICS = (ANGLE, POSITION, JITTER, TRUE_JITTER, SKATE, TRUE_SKATE)
 """Metrics of a cell that are kept for every condition (docs/metrics.md)."""
 SILENT_ANGLE = "joint_angle_silent_deg"
 """Mean joint angle error while the station is silent [deg]; only where one is."""
-COVERAGES = ("sigma_coverage_1", "sigma_coverage_2")
-"""Shares of errors within one and two of the stated sigma; only of methods that state one."""
+COVERAGES = ("sigma_coverage_1", "sigma_coverage_95")
+"""Shares of errors within one stated sigma and within the stated 95 % region; only of methods that state them."""
 SIGNIFICANT_DIGITS = 6
 DEFAULT_BASELINE = BASELINES / "accuracy" / "dynamic_map_40f3d61.json"
 """Errors of `dynamic_map` of commit 40f3d61, relative to the root of a source checkout."""

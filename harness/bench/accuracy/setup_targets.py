@@ -45,7 +45,7 @@ WORSE_BY = 1.05
 MOST_WORSE: Limits = (0.15, 0.05)
 """Largest share of clips that are worse than the reference, and the goal."""
 COVERAGE_RANGES = (((0.60, 0.76), (0.64, 0.72)), ((0.91, 0.98), (0.93, 0.97)))
-"""Ranges of the shares of errors within one and two of the stated sigma, and the goals."""
+"""Ranges of the shares of errors within one stated sigma and within the stated 95 % region, and the goals."""
 
 
 @dataclass(frozen=True)
@@ -176,8 +176,8 @@ def _state_worse_clips(rows: Sequence[SetUpRow]) -> Iterator[BenchmarkStatement]
 
 
 def _state_coverage(method: str, row: SetUpRow) -> Iterator[BenchmarkStatement]:
-    """Shares of errors within one and two of the stated sigma; nothing for a method that states none."""
-    for metric, (allowed, goal), sigmas in zip(COVERAGES, COVERAGE_RANGES, ("1 sigma", "2 sigma"), strict=True):
+    """Shares of errors within one stated sigma and the stated 95 % region; nothing for a method that states none."""
+    for metric, (allowed, goal), sigmas in zip(COVERAGES, COVERAGE_RANGES, ("1 sigma", "95 % region"), strict=True):
         values = {clip: value for clip, e in row.ours.items() if (value := e.mean(metric)) is not None}
         if not values:
             continue

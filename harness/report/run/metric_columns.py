@@ -17,7 +17,7 @@ TABLE_COLUMNS = (
 SIGMA_TITLE = "standard deviations that methods state for hinge angles, pooled over frames and hinges"
 SIGMA_COLUMNS = (
     ("within 1 sigma [%]", "sigma_coverage_1", 1, 100.0),
-    ("within 2 sigma [%]", "sigma_coverage_2", 1, 100.0),
+    ("within 95 % region [%]", "sigma_coverage_95", 1, 100.0),
     ("lowest hinge, 1 sigma [%]", "sigma_lowest_coverage_1", 1, 100.0),
     ("mean sigma [deg]", "sigma_width_deg", 2, 1.0),
     ("log score [nat]", "sigma_log_score", 2, 1.0),
@@ -26,8 +26,11 @@ SIGMA_COLUMNS = (
 
 
 def format_sigma_scores(scores: Mapping[str, float]) -> list[str]:
-    """The scores as texts, in the order of `SIGMA_COLUMNS`."""
-    return [format_fixed(factor * scores[name], decimals) for _, name, decimals, factor in SIGMA_COLUMNS]
+    """The scores as texts, in the order of `SIGMA_COLUMNS`; "-" for one that an earlier version did not write."""
+    return [
+        format_fixed(factor * scores[name], decimals) if name in scores else "-"
+        for _, name, decimals, factor in SIGMA_COLUMNS
+    ]
 
 
 def sigma_lines(head: Sequence[str], rows: Sequence[tuple[Sequence[str], Mapping[str, float]]]) -> list[str]:

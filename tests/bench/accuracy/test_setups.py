@@ -102,7 +102,7 @@ def test_sigma_is_held_to_a_range(share: float, verdict: str) -> None:
     ours = planted(1.0, **{COVERAGES[0]: (share,), COVERAGES[1]: (0.95,)})
     found = evaluate_setups("ours", ours, {"a": planted(1.0)}, COMMIT)
     assert statement(found, "dropout 30, new, built-in: ours within 1 sigma").verdict == verdict
-    assert statement(found, "dropout 30, new, built-in: ours within 2 sigma").verdict == "met"
+    assert statement(found, "dropout 30, new, built-in: ours within 95 % region").verdict == "met"
     without = evaluate_setups("ours", planted(1.0), {"a": planted(1.0)}, COMMIT)
     assert not [one for one in without if "sigma" in one.text]
 

@@ -81,7 +81,7 @@ def test_the_table_has_the_scores_of_the_summary(run_folder: Path) -> None:
         row = texts[texts.index(f"{method} (lag 2)" if method == "late" else method) :]
         assert row[1] == "walking"
         assert row[2] == f"{100.0 * pooled[method]['sigma_coverage_1']:.1f}"
-        assert row[3] == f"{100.0 * pooled[method]['sigma_coverage_2']:.1f}"
+        assert row[3] == f"{100.0 * pooled[method]['sigma_coverage_95']:.1f}"
         assert row[4] == f"{100.0 * pooled[method]['sigma_lowest_coverage_1']:.1f}"
         assert row[6] == f"{pooled[method]['sigma_width_deg']:.2f}"
         assert row[7] == f"{pooled[method]['sigma_log_score']:.2f}"
