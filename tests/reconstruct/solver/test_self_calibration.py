@@ -17,12 +17,14 @@ from harness.reconstruct.solver.self_calibration import (
     LossScale,
     Posterior,
     SelfCalibration,
+    Trust,
     median_distance,
     posterior,
 )
 from harness.reconstruct.solver.subspace import SubspaceSolver
 from harness.reconstruct.solver.subspace_minimiser import Subspace
 from harness.stream import TrackerFrame
+from harness.testing.frames import drop_stations
 from tests.reconstruct.conftest import Scene
 
 SQUARES = Loss(robust=False)
@@ -57,8 +59,8 @@ def errors_of(residuals: Residuals, z: Floats, sigma: tuple[float, float]) -> Fl
 @pytest.fixture(autouse=True)
 def planted_constants(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rates and limits for these tests, whatever validation clips choose."""
-    values = {"_NOISE_RATE": 0.1, "_PRIOR_RATE": 0.1, "_PRIOR_FREEDOM": 36.0}
-    values |= {"_MIN_NOISE": 0.1, "_MAX_NOISE": 1.2, "_MIN_PRIOR": 0.7, "_MAX_PRIOR": 100.0}
+    values = {"_NOISE_RATE": 0.1, "_INFLATION": 1.0, "_SCALE_S": 0.25, "_KIND_S": 1.0, "_FIRST_INFORMATION": 36.0}
+    values |= {"_MIN_NOISE": 0.1, "_MAX_NOISE": 1.2, "_MIN_SCALE": 0.3, "_MAX_SCALE": 100.0, "_KNOWN": 0.8, "_NEW": 2.5}
     for name, value in values.items():
         monkeypatch.setattr(self_calibration, name, value)
 
@@ -92,7 +94,8 @@ def test_the_posterior_is_that_of_the_hessian_by_differences(
     of_prior = np.zeros((55, 55))
     of_prior[3:, 3:] = prior.curvature
     covariance = np.linalg.inv(of_positions + of_orientations + of_prior + 1e-6 * np.eye(55))
-    found = posterior(residuals.tree, residuals.targets, residuals.state, prior, z)
+    other = z[3:] + 0.02 * rng.normal(size=52), np.linalg.inv(spread[::-1, ::-1])
+    found = posterior(residuals.tree, residuals.targets, residuals.state, prior, other, z)
     np.testing.assert_allclose(found.variance, np.diag(covariance)[3:], rtol=2e-3)
     shares = [np.trace(covariance @ part) for part in (of_positions, of_orientations, of_prior)]
     expected = [
@@ -104,8 +107,9 @@ def test_the_posterior_is_that_of_the_hessian_by_differences(
     ]
     assert found.position == pytest.approx(expected[0], rel=2e-3)
     assert found.orientation == pytest.approx(expected[1], rel=2e-3)
-    away = offset @ prior.curvature @ offset
-    assert found.prior == pytest.approx(away + shares[2] - 52, abs=0.05)
+    away = z[3:] - other[0]
+    assert found.distance == pytest.approx(away @ other[1] @ away)
+    assert found.information == pytest.approx(52 - shares[2], abs=0.05)
 
 
 def test_the_shares_of_the_posterior_are_as_many_as_the_unknowns(walk: Scene, spread: Floats) -> None:
@@ -115,8 +119,9 @@ def test_the_shares_of_the_posterior_are_as_many_as_the_unknowns(walk: Scene, sp
     qpos = walk.take.qpos[30]
     residuals.evaluate(qpos)
     z = np.concatenate([ground_from_qpos(qpos), posture_from_qpos(qpos)])
-    found = posterior(residuals.tree, residuals.targets, residuals.state, subspace(z[3:], spread), z)
-    assert 18 * found.position + 18 * found.orientation + found.prior + 52 == pytest.approx(55.0, abs=1e-3)
+    found = judge(residuals, subspace(z[3:], spread), z)
+    assert 18 * found.position + 18 * found.orientation - found.information == pytest.approx(3.0, abs=1e-3)
+    assert found.distance == 0.0
     assert min(found.position, found.orientation) > 0.0
 
 
@@ -126,8 +131,7 @@ def test_the_state_is_left_as_it_was(walk: Scene, spread: Floats) -> None:
     residuals.evaluate(walk.take.qpos[31])
     z = np.concatenate([ground_from_qpos(walk.take.qpos[31]), posture_from_qpos(walk.take.qpos[31])])
     before = residuals.state.weight.copy(), residuals.state.error.copy()
-    one = posterior(residuals.tree, residuals.targets, residuals.state, subspace(z[3:], spread), z)
-    two = posterior(residuals.tree, residuals.targets, residuals.state, subspace(z[3:], spread), z)
+    one, two = (judge(residuals, subspace(z[3:], spread), z) for _ in range(2))
     np.testing.assert_array_equal(residuals.state.weight, before[0])
     np.testing.assert_array_equal(residuals.state.error, before[1])
     assert one.variance.tobytes() == two.variance.tobytes()
@@ -142,7 +146,7 @@ def test_an_outlier_counts_as_a_limited_square(walk: Scene, spread: Floats) -> N
         position_m[0, 0] += shift_m
         residuals.read(replace(walk.frames[30], position_m=position_m))
         residuals.evaluate(walk.take.qpos[30])
-        found.append(posterior(residuals.tree, residuals.targets, residuals.state, subspace(z[3:], spread), z))
+        found.append(judge(residuals, subspace(z[3:], spread), z))
     none, large, larger = found
     assert large.position == pytest.approx(larger.position, abs=0.05)
     assert large.position - none.position == pytest.approx(self_calibration._MAX_SQUARE / 18.0, abs=0.2)
@@ -157,22 +161,26 @@ def test_the_prior_is_judged_without_the_readings(walk: Scene, spread: Floats) -
     z = np.concatenate([ground_from_qpos(walk.take.qpos[30]), posture_from_qpos(walk.take.qpos[30])])
     values, vectors = np.linalg.eigh(spread)
     found = [
-        posterior(
-            residuals.tree,
-            residuals.targets,
-            residuals.state,
-            subspace(z[3:] - far * math.sqrt(values[40]) * vectors[:, 40], spread),
-            z,
-        )
+        judge(residuals, subspace(z[3:] - far * math.sqrt(values[40]) * vectors[:, 40], spread), z)
         for far in (0.0, 1.0, 3.0)
     ]
-    assert [f.prior - found[0].prior for f in found] == pytest.approx([0.0, 1.0, 9.0], abs=1e-6)
+    assert [f.distance for f in found] == pytest.approx([0.0, 1.0, 9.0], abs=1e-6)
+
+
+def judge(residuals: Residuals, prior: Subspace, z: Floats) -> Posterior:
+    """The posterior at z (55,), whose prior is that of the experts alone."""
+    return posterior(residuals.tree, residuals.targets, residuals.state, prior, (prior.mean, prior.curvature), z)
 
 
 def calibrate(
-    scene: Scene, position_m: float, orientation_rad: float, spread_factor: float, outliers: float = 0.0
-) -> SelfCalibration:
-    """Scales after 800 frames of readings with planted noise, and of priors whose means err as planted.
+    scene: Scene,
+    position_m: float,
+    orientation_rad: float,
+    spread_factor: float,
+    outliers: float = 0.0,
+    stations: int = 6,
+) -> tuple[SelfCalibration, Trust]:
+    """Scales and trust after 800 frames of readings with planted noise, and of priors whose means err as planted.
 
     The priors claim 0.01 for every number; under wider ones the scales converge more slowly. Of positions a share of
     `outliers` is off by 0.5 m.
@@ -180,63 +188,76 @@ def calibrate(
     rng, loss = np.random.default_rng(3), Loss()
     residuals, limits = Residuals(scene.body, scene.calibration, loss), HingeLimits(scene.body)
     solver, scales = SubspaceSolver(residuals, limits, Stopping()), SelfCalibration(0.003, math.radians(0.5))
+    trust = Trust(40.0)
     for index in range(800):
         k = index % len(scene.frames)
         frame, qpos = noisy(scene.frames[k], position_m, orientation_rad, rng), scene.take.qpos[k]
         wild = 0.5 * (rng.random((6, 1)) < outliers) * np.array([1.0, 0.0, 0.0])
         residuals.set_sigma(scales.position_sigma_m, scales.orientation_sigma_rad)
-        residuals.read(replace(frame, position_m=frame.position_m + wild))
+        read = replace(frame, position_m=frame.position_m + wild)
+        residuals.read(drop_stations(read, range(stations, 6)))
         true = posture_from_qpos(qpos)
         mean = true + 0.01 * spread_factor * rng.normal(size=52)
         mean[3] = 0.0
         mean[HINGES] = limits.clip(mean[HINGES])
-        prior = subspace(mean, scales.prior * 0.01**2 * np.eye(52))
+        prior = subspace(mean, trust.inflation * 0.01**2 * np.eye(52))
         solution = solver.solve(prior, ground_from_qpos(qpos), mean)
         z = np.concatenate([ground_from_qpos(solution.qpos), posture_from_qpos(solution.qpos)])
-        scales.update(posterior(residuals.tree, residuals.targets, residuals.state, prior, z))
-    return scales
+        found = judge(residuals, prior, z)
+        scales.update(found)
+        trust.update(found)
+    return scales, trust
 
 
 @pytest.mark.parametrize("position_mm", [1.0, 3.0])
 @pytest.mark.parametrize("orientation_deg", [0.1, 0.4])
 def test_the_noise_of_the_readings_is_found(walk: Scene, position_mm: float, orientation_deg: float) -> None:
-    scales = calibrate(walk, 1e-3 * position_mm, math.radians(orientation_deg), 1.0)
+    scales, _ = calibrate(walk, 1e-3 * position_mm, math.radians(orientation_deg), 1.0)
     assert 1e3 * scales.position_sigma_m == pytest.approx(position_mm, rel=0.3)
     assert math.degrees(scales.orientation_sigma_rad) == pytest.approx(orientation_deg, rel=0.3)
 
 
-def test_a_prior_that_errs_more_than_it_says_is_widened(walk: Scene) -> None:
-    narrow, right, wide = (calibrate(walk, 1e-3, math.radians(0.1), factor).prior for factor in (0.2, 1.0, 2.0))
-    assert narrow < right < wide
-    assert 1.5 < wide < 8.0
+@pytest.mark.parametrize("stations", [6, 3])
+def test_the_inflation_is_three_times_the_planted_ratio_of_variances(
+    walk: Scene, stations: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An inflated prior does not hide the ratio, nor do fewer readings."""
+    monkeypatch.setattr(self_calibration, "_INFLATION", 3.0)
+    for factor in (0.7, 1.0, 2.0, 3.0):
+        _, trust = calibrate(walk, 1e-3, math.radians(0.1), factor, stations=stations)
+        assert trust.inflation / 3.0 == pytest.approx(factor**2, rel=0.4)
+        assert (trust.newness == 0.0) == (factor < 0.9) or factor == 1.0
+        assert (trust.newness == 1.0) == (factor > 1.5)
 
 
 def test_outliers_do_not_blow_up_the_noise(walk: Scene) -> None:
-    scales = calibrate(walk, 1e-3, math.radians(0.1), 1.0, outliers=0.02)
+    scales, _ = calibrate(walk, 1e-3, math.radians(0.1), 1.0, outliers=0.02)
     assert 0.7e-3 < scales.position_sigma_m < 2.5e-3
     assert math.degrees(scales.orientation_sigma_rad) < 0.2
 
 
-def found(position: float = 1.0, orientation: float = 1.0, prior: float = 0.0) -> Posterior:
-    return Posterior(np.zeros(52), position, orientation, prior)
+def found(
+    position: float = 1.0, orientation: float = 1.0, distance: float = 0.0, information: float = 0.0
+) -> Posterior:
+    return Posterior(np.zeros(52), position, orientation, distance, information)
 
 
 def test_scales_start_and_stay_where_residuals_are_as_large_as_they_should_be() -> None:
     scales = SelfCalibration(0.003, 0.01)
     for _ in range(3):
         scales.update(found())
-    assert (scales.position_sigma_m, scales.orientation_sigma_rad, scales.prior) == pytest.approx((0.003, 0.01, 1.0))
+    assert (scales.position_sigma_m, scales.orientation_sigma_rad) == pytest.approx((0.003, 0.01))
 
 
 def test_every_scale_follows_its_own_ratio() -> None:
     for ratios, moved in (
-        (found(position=0.5), (True, False, False)),
-        (found(orientation=0.5), (False, True, False)),
-        (found(prior=18.0), (False, False, True)),
+        (found(position=0.5), (True, False)),
+        (found(orientation=0.5), (False, True)),
+        (found(distance=18.0), (False, False)),
     ):
         scales = SelfCalibration(0.003, 0.01)
         scales.update(ratios)
-        now = scales.position_sigma_m / 0.003, scales.orientation_sigma_rad / 0.01, scales.prior
+        now = scales.position_sigma_m / 0.003, scales.orientation_sigma_rad / 0.01
         assert tuple(abs(share - 1.0) > 1e-6 for share in now) == moved
         assert all(0.8 < share < 1.3 for share in now), "slowly"
 
@@ -252,11 +273,44 @@ def test_a_frame_moves_a_deviation_by_a_power_of_its_ratio() -> None:
 def test_scales_keep_their_limits(ratio: float) -> None:
     scales = SelfCalibration(0.003, 0.01)
     for _ in range(200):
-        scales.update(found(ratio, ratio, 1e6 * (ratio - 1.0)))
+        scales.update(found(ratio, ratio))
     share = 1.2 if ratio > 1.0 else 0.1
     assert scales.position_sigma_m == pytest.approx(share * 0.003)
     assert scales.orientation_sigma_rad == pytest.approx(share * 0.01)
-    assert scales.prior == pytest.approx(100.0 if ratio > 1.0 else 0.7)
+
+
+def test_trust_starts_and_stays_where_the_distance_is_the_information() -> None:
+    trust = Trust(40.0)
+    for information in (36.0, 10.0, 1.0, 0.0):
+        trust.update(found(distance=information / trust.inflation, information=information))
+        assert (trust.inflation, trust.newness) == (pytest.approx(1.0), pytest.approx(math.log(1.25) / math.log(3.125)))
+
+
+@pytest.mark.parametrize("rate_hz", [40.0, 200.0])
+def test_the_inflation_follows_in_a_quarter_of_a_second_and_the_newness_in_a_second(rate_hz: float) -> None:
+    """Means of distance and information, each about the planted ratio of 9 after many time constants."""
+    trust, inflations, newness = Trust(rate_hz), [], []
+    for _ in range(round(2.0 * rate_hz)):
+        trust.update(found(distance=9.0 * 36.0 / trust.inflation, information=36.0))
+        inflations.append(trust.inflation)
+        newness.append(trust.newness)
+    at = [round(seconds * rate_hz) - 1 for seconds in (0.25, 1.0)]
+    assert inflations[at[0]] == pytest.approx(1.0 + 8.0 * (1.0 - math.exp(-1.0)), rel=0.03)
+    assert inflations[-1] == pytest.approx(9.0, rel=0.01)
+    at_tenth = 1.0 + 8.0 * (1.0 - math.exp(-0.1))
+    tenth = newness[round(0.1 * rate_hz) - 1]
+    assert tenth == pytest.approx(math.log(at_tenth / 0.8) / math.log(3.125), rel=0.03)
+    assert newness[-1] == 1.0
+
+
+@pytest.mark.parametrize(("ratio", "limit", "newness"), [(1e-9, 0.3, 0.0), (1e9, 100.0, 1.0)])
+def test_trust_keeps_its_limits(ratio: float, limit: float, newness: float) -> None:
+    trust = Trust(40.0)
+    for _ in range(600):
+        trust.update(found(distance=ratio, information=1.0))
+    assert (trust.inflation, trust.newness) == (pytest.approx(limit), newness)
+    trust.update(found(distance=1.0, information=-1.0))
+    assert math.isfinite(trust.inflation)
 
 
 @pytest.fixture(autouse=True)
