@@ -38,7 +38,7 @@ ANGLE_LIMITS: Mapping[str, Mapping[str, Limits]] = {
 }
 """Set-up -> group of performers -> limits of the joint angle error."""
 POSITION_LIMITS: Mapping[str, Mapping[str, Limits]] = {"head_hands": {"new": (0.87, 0.78)}}
-"""The same of the position error."""
+"""Set-up -> group of performers -> limits of the position error."""
 GROUPS = ("known", "new", "new walkers")
 WORSE_BY = 1.05
 """Ratio above which a clip is worse than the reference."""

@@ -48,8 +48,6 @@ class LocalGaussian(NamedTuple):
     """(D,) weighted mean."""
     covariance: Floats
     """(D, D) weighted covariance, lower triangle."""
-    nearest: float
-    """Mean squared distance of the examples of the nearest cell from the query."""
 
 
 class Targets(Protocol):
@@ -141,7 +139,7 @@ def local_gaussian(table: MomentTable, query: Floats, neighbours: int, width: fl
         for j in range(i + 1):
             covariance[i, j] = packed[at + j]
         at += i + 1
-    return LocalGaussian(mean, covariance, distance[0])
+    return LocalGaussian(mean, covariance)
 
 
 @compiled

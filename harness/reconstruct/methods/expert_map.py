@@ -14,9 +14,10 @@ Sources: Liu et al. 2011 (prediction times likelihood), Hinton 2002 (product of 
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -38,7 +39,6 @@ from harness.reconstruct.solver.fixed_lag import FixedLagSession
 from harness.reconstruct.solver.floor_contact import FloorContact
 from harness.reconstruct.solver.ground_frame import (
     HINGES,
-    POSTURE_SIZE,
     ground_and_posture,
     ground_from_qpos,
     posture_from_qpos,
@@ -81,6 +81,10 @@ Gaussian = tuple[Floats, Floats]
 @dataclass(frozen=True)
 class ExpertMap(DatabaseLearner["FittedExpertMap"]):
     """Options of the product of local experts, a `Method`."""
+
+    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {
+        "widening": "Leave it out: the readings show how much a performer differs from the examples."
+    }
 
     name: str = "expert_map"
     summary: str = "maximum a posteriori pose under tabulated local experts, with self-calibrated noise"
@@ -260,17 +264,8 @@ class ExpertMapSession(HistorySession):
             other = condition(around, u, self._no_noise, _HISTORY_RIDGE)
             power = options.history_weight / math.sqrt(trust.inflation)
         self._product = _multiply((mean, covariance), trust.inflation, other, power)
-        return self._contact.constrain(self._multiply_broad(self._product), history)
-
-    def _multiply_broad(self, product: Gaussian) -> Subspace:
-        """The product of the experts (mean (P,), precision (P, P)) with the broad Gaussian, by the share of newness."""
-        mean, precision = product
-        weight = self._options.broad_weight * self._trust.newness
-        if weight > 0.0:
-            broad_mean, broad_variance = self._broad
-            mean, precision = add_independent(mean, precision, broad_mean, weight / broad_variance)
-        none = np.zeros(POSTURE_SIZE)
-        return Subspace(mean, np.zeros((0, POSTURE_SIZE)), precision, none, none)
+        prior = _multiply_broad(self._product, self._broad, options.broad_weight * trust.newness)
+        return self._contact.constrain(prior, history)
 
 
 @compiled
@@ -303,15 +298,18 @@ def _multiply(expert: Gaussian, inflation: float, other: Gaussian, power: float)
 
 
 @compiled
-def add_independent(mean: Floats, precision: Floats, other: Floats, added: Floats) -> Gaussian:
-    """Mean and precision of the product of a Gaussian with another one of independent numbers.
+def _multiply_broad(product: Gaussian, broad: Gaussian, power: float) -> Subspace:
+    """The prior: a Gaussian of this mean and precision, times a power of one of independent numbers.
 
-    `other` (P,) is its mean and `added` (P,) its precision.
+    `broad` are the mean (P,) and the variance (P,) of the other one.
     """
-    total = precision.copy()
-    for i in range(len(mean)):
-        total[i, i] += added[i]
-    return mean + np.linalg.solve(total, added * (other - mean)), total
+    mean, precision = product[0], product[1].copy()
+    if power > 0.0:
+        added = power / broad[1]
+        for i in range(len(mean)):
+            precision[i, i] += added[i]
+        mean = mean + np.linalg.solve(precision, added * (broad[0] - mean))
+    return Subspace(mean, np.zeros((0, len(mean))), precision, np.zeros(len(mean)), np.zeros(len(mean)))
 
 
 @compiled

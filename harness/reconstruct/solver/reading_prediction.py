@@ -144,19 +144,19 @@ def record_readings(
         if suspect[s] or np.isnan(measured_s[s]):
             continue
         if measured[s]:
-            shift = READINGS - 1 if measured_s[s] > history.position_s[s, 0] else 0  # a frame may be read again
-            for k in range(shift, 0, -1):
-                history.position_s[s, k] = history.position_s[s, k - 1]
-                history.position_m[s, k] = history.position_m[s, k - 1]
-            history.position_s[s, 0] = measured_s[s]
-            history.position_m[s, 0] = position_m[s]
+            _put_first(history.position_s[s], history.position_m[s], measured_s[s], position_m[s])
         if measured[count + s]:
-            shift = READINGS - 1 if measured_s[s] > history.turn_s[s, 0] else 0
-            for k in range(shift, 0, -1):
-                history.turn_s[s, k] = history.turn_s[s, k - 1]
-                history.turn[s, k] = history.turn[s, k - 1]
-            history.turn_s[s, 0] = measured_s[s]
-            history.turn[s, 0] = turn[s]
+            _put_first(history.turn_s[s], history.turn[s], measured_s[s], turn[s])
+
+
+@compiled
+def _put_first(time_s: Floats, values: Floats, measured_s: float, value: Floats) -> None:
+    """Take a reading as the newest of (K,) times and (K, D) values; one of a frame that is read again replaces it."""
+    if measured_s > time_s[0]:
+        time_s[1:] = time_s[:-1].copy()
+        values[1:] = values[:-1].copy()
+    time_s[0] = measured_s
+    values[0] = value
 
 
 @compiled

@@ -39,8 +39,8 @@ def weighted_moments(pairs: Floats, weight: Floats) -> tuple[Floats, Floats]:
 
 def by_definition(
     features: Singles, targets: Singles, cell: Ints, query: Floats, neighbours: int, width: float
-) -> tuple[Floats, Floats, float]:
-    """Mean, covariance and nearest distance from the examples themselves, whose weights are those of their cells."""
+) -> tuple[Floats, Floats]:
+    """Mean and covariance from the examples themselves, whose weights are those of their cells."""
     pairs = np.concatenate([features, targets], axis=1, dtype=float)
     names = np.unique(cell)
     away = np.sum((pairs[:, :F] - query) ** 2, axis=1)
@@ -52,13 +52,12 @@ def by_definition(
     weight = np.zeros(len(pairs))
     for k in used:
         weight[cell == names[k]] = np.exp(-(distance[k] - distance.min()) / (2.0 * width * half))
-    return *weighted_moments(pairs, weight), float(distance.min())
+    return weighted_moments(pairs, weight)
 
 
-def agrees(local: LocalGaussian, wanted: tuple[Floats, Floats, float]) -> None:
+def agrees(local: LocalGaussian, wanted: tuple[Floats, Floats]) -> None:
     np.testing.assert_allclose(local.mean, wanted[0], atol=1e-5)
     np.testing.assert_allclose(symmetric(local.covariance), wanted[1], atol=2e-5)
-    assert local.nearest == pytest.approx(wanted[2], rel=1e-4, abs=1e-5)
 
 
 def test_one_cell_holds_the_moments_of_all_examples() -> None:
@@ -98,7 +97,6 @@ def test_cells_of_several_examples_give_each_its_cells_weight(neighbours: int, a
     found = local_gaussian(table, query.astype(float), neighbours, 0.3)
     np.testing.assert_allclose(found.mean, wanted[0], atol=1e-4)
     np.testing.assert_allclose(symmetric(found.covariance), wanted[1], atol=1e-3)
-    assert found.nearest == pytest.approx(wanted[2], rel=1e-4)
 
 
 def test_the_number_of_cells_follows_the_number_of_examples_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -146,7 +144,7 @@ def planted(rng: np.random.Generator, features: int = 6, targets: int = 5) -> tu
     size = features + targets
     root, noise_root = rng.normal(size=(size, 2 * size)), rng.normal(size=(features, features))
     covariance = root @ root.T / size
-    local = LocalGaussian(rng.normal(size=size), np.where(np.tri(size) > 0.0, covariance, np.nan), 0.3)
+    local = LocalGaussian(rng.normal(size=size), np.where(np.tri(size) > 0.0, covariance, np.nan))
     return local, rng.normal(size=features), 0.3 * noise_root @ noise_root.T
 
 
@@ -180,7 +178,7 @@ def test_noise_shrinks_the_regression_towards_the_mean(rng: np.random.Generator)
 
 def test_features_without_variance_condition_nothing() -> None:
     """As with a single example: the mean and the covariance of the targets are what they were."""
-    local = LocalGaussian(np.arange(5.0), np.diag([0.0, 0.0, 1.0, 2.0, 3.0]), 0.0)
+    local = LocalGaussian(np.arange(5.0), np.diag([0.0, 0.0, 1.0, 2.0, 3.0]))
     mean, covariance = condition(local, np.array([5.0, -5.0]), np.zeros((2, 2)), 0.1)
     np.testing.assert_allclose(mean, [2.0, 3.0, 4.0])
     np.testing.assert_allclose(covariance, np.diag([1.0, 2.0, 3.0]))
