@@ -3,6 +3,9 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import numpy as np
+
+from harness.core.arrays import Floats
 from harness.core.number_format import count_noun, format_share
 
 LEAST_ARRIVED = 0.9
@@ -10,6 +13,9 @@ LEAST_ARRIVED = 0.9
 refuse every overload; a tenth leaves room for bursts [choice]."""
 RECORD_BYTES, BAUD = "record_bytes", "line_baud"
 """Keys in the health of a stream whose line let nothing be measured: the size of a record and the line's bit rate."""
+
+READING_AGE = "reading_age_ms"
+"""Key in the health of a stream whose line may drop records: the mean age of the stations' newest readings [ms]."""
 
 
 def excess_loss(health: Mapping[str, Any], *, allowed: bool) -> float:
@@ -29,6 +35,8 @@ def describe_line_loss(streams: Iterable[Mapping[str, Any]]) -> str:
         return ""
     unmeasured = [row for row in rows if BAUD in row["health"]]
     text = f"THE LINK IS TOO SLOW: {format_share(dropped / records)} of the records were dropped"
+    if ages_ms := [float(row["health"][READING_AGE]) for row in rows if READING_AGE in row["health"]]:
+        text += f"; stations' newest readings were {sum(ages_ms) / len(ages_ms):.0f} ms old on average"
     return f"{text}; {_describe_cause(unmeasured)}" if unmeasured else text
 
 
@@ -52,6 +60,23 @@ def _describe_cause(rows: list[Mapping[str, Any]]) -> str:
         f"{dropped:,.0f} of {records:,.0f} on {row['clip']}: {cause}. {count_noun(len(rows), 'cell')} not measured. "
         f"Choose {remedy}. If the slow line is what the scenario studies, set tracker.overload = true"
     )
+
+
+def mean_reading_age_s(measured_s: Floats, period_s: float) -> float:
+    """Mean age of the newest readings of S stations over frames (F, S) of device times [s], which are NaN for none.
+
+    The age is that at the newest reading of a frame, one period after that of the frame before where a frame has none.
+    Stations count from their first reading on; NaN if there is none.
+    """
+    instant_s, newest_s, total_s, count = np.nan, np.full(measured_s.shape[1], np.nan), 0.0, 0
+    for row_s in measured_s:
+        present = np.isfinite(row_s)
+        newest_s[present] = row_s[present]
+        instant_s = row_s[present].max() if present.any() else instant_s + period_s
+        known = np.isfinite(newest_s)
+        total_s += float(np.sum(instant_s - newest_s[known]))
+        count += int(known.sum())
+    return total_s / count if count else float("nan")
 
 
 def _counts(health: Mapping[str, Any]) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.fault_report import named_folder_fault
-from harness.core.stream_health import BAUD, RECORD_BYTES, excess_loss
+from harness.core.stream_health import BAUD, READING_AGE, RECORD_BYTES, excess_loss, mean_reading_age_s
 from harness.errors import BadInput, HarnessError
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.evaluation import evaluate
@@ -125,6 +125,9 @@ def evaluate_cell(evaluation: ClipEvaluation, method: Method, planned: PlannedCe
     if too_slow:
         health = health | {RECORD_BYTES: record_size(scenario.tracker.items), BAUD: scenario.tracker.baud}
     shape = len(frames), len(simulation.stations)  # also of no frame at all
+    if scenario.tracker.overload and frames:
+        age_s = mean_reading_age_s(np.array([frame.measured_s for frame in frames]), 1.0 / scenario.tracker.rate_hz)
+        health = health | {READING_AGE: 1e3 * age_s} if np.isfinite(age_s) else health
     readings: dict[str, Any] = {
         name: np.array([getattr(frame, name) for frame in frames], kind).reshape(shape)
         for name, kind in _READINGS.items()

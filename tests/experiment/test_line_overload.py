@@ -4,12 +4,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from harness.cli import main
 from harness.compare import compare_runs
 from harness.core.split import ClipPart
-from harness.core.stream_health import describe_line_loss, excess_loss
+from harness.core.stream_health import describe_line_loss, excess_loss, mean_reading_age_s
 from harness.errors import Outcome
 from harness.experiment import engine
 from harness.experiment.clip_evaluation import ClipEvaluation
@@ -73,11 +74,28 @@ def test_a_line_that_drops_most_records_is_not_comparable(
 
 
 @pytest.mark.long
-def test_a_scenario_that_studies_the_slow_line_is_measured(tmp_path: Path) -> None:
-    path = tmp_path / "slow.toml"
-    path.write_text(f"{SCENARIO}baud = 19200\noverload = true\n")
-    assert main(["run", str(path), "--out", str(tmp_path / "run"), "--no-report"]) == 0
-    assert measured(tmp_path / "run") == [True]
+def test_a_scenario_that_studies_the_slow_line_is_measured_and_says_how_old_readings_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, ages_ms = tmp_path / "slow.toml", []
+    for baud in (9600, 19200):
+        path.write_text(f"{SCENARIO}baud = {baud}\noverload = true\n")
+        capsys.readouterr()
+        assert main(["run", str(path), "--out", str(tmp_path / str(baud)), "--no-report"]) == 0
+        assert measured(tmp_path / str(baud)) == [True]
+        ages_ms.append(read_summary(tmp_path / str(baud))["cells"][0]["health"]["reading_age_ms"])
+        assert f"newest readings were {ages_ms[-1]:.0f} ms old on average" in capsys.readouterr().out
+    assert 70.0 < ages_ms[0] < 140.0  # a station every 200 ms
+    assert 0.35 < ages_ms[1] / ages_ms[0] < 0.65
+
+
+def test_ages_of_readings_count_from_the_newest_of_a_frame() -> None:
+    """Frame 2 has no reading; the second station has its first one in frame 1."""
+    nan = float("nan")
+    measured_s = np.array([[0.0, nan], [0.1, 0.12], [nan, nan], [nan, 0.3]])
+    ages_s = [0.0, 0.02, 0.0, 0.12, 0.1, 0.2, 0.0]
+    assert mean_reading_age_s(measured_s, 0.1) == pytest.approx(np.mean(ages_s))
+    assert np.isnan(mean_reading_age_s(np.full((3, 2), nan), 0.1))
 
 
 @pytest.mark.long
