@@ -1,6 +1,7 @@
 """The product of local experts on known motion, inside and outside its examples."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -403,6 +404,22 @@ def test_the_distance_is_from_the_experts_without_the_broad_gaussian(walk: Scene
     assert np.abs(session._predict(history=True).mean - broad).max() > 0.01
     for one, two in zip(with_broad, session._product, strict=True):
         np.testing.assert_allclose(one, two)
+
+
+def test_the_trust_is_measured_from_the_experts_alone(
+    walk: Scene, fitted: FittedExpertMap, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session, seen = warm(walk, fitted, broad_weight=5.0), list[tuple[Any, ...]]()
+
+    def noted(*arguments: Any) -> Any:
+        seen.append(arguments)
+        return posterior(*arguments)
+
+    monkeypatch.setattr(expert_map, "posterior", noted)
+    session._trust.newness = 1.0
+    session.step(walk.frames[10])
+    ((_, _, _, prior, (mean, _), _),) = seen
+    assert np.abs(prior.mean - mean).max() > 0.01
 
 
 def test_without_a_history_the_past_postures_do_not_matter(walk: Scene, fitted: FittedExpertMap) -> None:
