@@ -67,7 +67,7 @@ def posture_of_others(database: MotionDatabase) -> tuple[Floats, Floats]:
         found = np.stack([np.ones(posture.shape[1]) * len(posture), posture.sum(axis=0), (posture**2).sum(axis=0)])
         sums.setdefault(run.subject, []).append(found)
     database.release_memory()
-    frames, total, squares = np.moveaxis([np.sum(parts, axis=0) for parts in sums.values()], 1, 0)
+    frames, total, squares = np.stack([np.sum(parts, axis=0) for parts in sums.values()], axis=1)
     means, weights = total / frames, np.sqrt(frames)
     mean = np.sum(weights * means, axis=0) / weights.sum(axis=0)
     others = mean

@@ -1,7 +1,7 @@
 """The product of local experts on known motion, inside and outside its examples."""
 
 from dataclasses import replace
-from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -409,16 +409,11 @@ def test_the_distance_is_from_the_experts_without_the_broad_gaussian(walk: Scene
 def test_the_trust_is_measured_from_the_experts_alone(
     walk: Scene, fitted: FittedExpertMap, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    session, seen = warm(walk, fitted, broad_weight=5.0), list[tuple[Any, ...]]()
-
-    def noted(*arguments: Any) -> Any:
-        seen.append(arguments)
-        return posterior(*arguments)
-
-    monkeypatch.setattr(expert_map, "posterior", noted)
+    session, spy = warm(walk, fitted, broad_weight=5.0), Mock(wraps=posterior)
+    monkeypatch.setattr(expert_map, "posterior", spy)
     session._trust.newness = 1.0
     session.step(walk.frames[10])
-    ((_, _, _, prior, (mean, _), _),) = seen
+    _, _, _, prior, (mean, _), _ = spy.call_args.args
     assert np.abs(prior.mean - mean).max() > 0.01
 
 
