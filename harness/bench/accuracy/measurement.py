@@ -27,7 +27,7 @@ from harness.bench.accuracy.conditions import (
     with_lag,
 )
 from harness.bench.accuracy.setup_targets import evaluate_setups
-from harness.bench.accuracy.setups import plan_setups, setup_of
+from harness.bench.accuracy.setups import SETUPS, plan_setups, setup_of
 from harness.bench.accuracy.statements import compare_methods, find_worse_clips, rank_pooled
 from harness.bench.accuracy.targets import LAGGED_CONDITION, evaluate_lag, evaluate_targets
 from harness.bench.common import fresh_methods, run_benchmark_cells
@@ -173,13 +173,15 @@ def collect_errors(rows: Iterable[Mapping[str, Any]], out: Path) -> dict[str, Er
 def condition_of(row: Mapping[str, Any]) -> Condition:
     """The condition of a cell's row; cells with later frames have the condition of those without."""
     scenario, setup = setup_of("boxing" if row["scenario"] == "boxing_lagged" else row["scenario"])
-    return Condition(scenario, row["noise"], row["inputs"], row["varied"].get("disturbance.station", ""), setup)
+    noise = SETUPS[setup].noise if setup else row["noise"]  # a cell whose components are set has "default*"
+    return Condition(scenario, noise, row["inputs"], row["varied"].get("disturbance.station", ""), setup)
 
 
 def _clip_errors(rows: Sequence[Mapping[str, Any]], out: Path) -> ClipErrors:
     rows = sorted(rows, key=lambda row: int(row["seed"]))
-    names = (*CELL_METRICS, *(name for name in COVERAGES if rows[0].get(name) is not None))
-    by_metric: dict[str, tuple[float | None, ...]] = {name: tuple(row[name] for row in rows) for name in names}
+    by_metric: dict[str, tuple[float | None, ...]] = {name: tuple(row[name] for row in rows) for name in CELL_METRICS}
+    if rows[0].get("sigma_scores"):
+        by_metric |= {name: tuple(row["sigma_scores"][name] for row in rows) for name in COVERAGES}
     if "disturbance.station" in rows[0]["varied"]:
         by_metric[SILENT_ANGLE] = tuple(_silent_angle_deg(cell_folder(out, row["key"])) for row in rows)
     return ClipErrors(rows[0]["behaviour"], rows[0]["performer"], by_metric)

@@ -88,7 +88,7 @@ def mean_over_units(errors: Mapping[str, ClipErrors], metric: str) -> float:
 
 
 def setup_rows(ours: ErrorsByCondition, stored: Mapping[str, ErrorsByCondition]) -> list[SetUpRow]:
-    """The rows of all set-ups that were measured; BadInput where clips differ from the stored ones.
+    """The rows of all set-ups; BadInput where one was not measured, and where clips differ from the stored ones.
 
     Real clips are known or new by their scenario, built-in ones by their performer.
     """
@@ -98,8 +98,10 @@ def setup_rows(ours: ErrorsByCondition, stored: Mapping[str, ErrorsByCondition])
             for motion in ("built-in", "CMU"):
                 chosen = _select(setup, group, motion, ours)
                 others = {name: _select(setup, group, motion, errors) for name, errors in stored.items()}
-                if not chosen or (group == "new walkers" and group not in ANGLE_LIMITS[setup]):
+                if group == "new walkers" and group not in ANGLE_LIMITS[setup]:
                     continue
+                if not chosen:
+                    raise BadInput(f"{setup}, {group}, {motion}: no cell was measured.", "")
                 if strange := [name for name, errors in others.items() if errors.keys() != chosen.keys()]:
                     raise BadInput(f"{setup}, {group}, {motion}: other clips than those of {strange[0]}.", "")
                 rows.append(SetUpRow(setup, group, motion, chosen, others))

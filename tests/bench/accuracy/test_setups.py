@@ -1,13 +1,14 @@
 """The planned set-ups, and their statements on planted errors: reference, units, worse clips and sigma."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from harness.bench.accuracy.clip_errors import ANGLE, COVERAGES, POSITION, ClipErrors, ErrorsByCondition
+from harness.bench.accuracy.clip_errors import ANGLE, CELL_METRICS, COVERAGES, POSITION, ClipErrors, ErrorsByCondition
 from harness.bench.accuracy.conditions import SEEDS
-from harness.bench.accuracy.measurement import condition_of
+from harness.bench.accuracy.measurement import collect_errors, condition_of
 from harness.bench.accuracy.setup_targets import ANGLE_LIMITS, evaluate_setups, setup_rows
 from harness.bench.accuracy.setups import SETUP_CONDITIONS, SETUPS, plan_setups
 from harness.errors import BadInput
@@ -58,6 +59,25 @@ def _row(scenario: Any) -> dict[str, Any]:
     (noise,) = scenario.vary["noise"]
     (inputs,) = scenario.inputs
     return {"scenario": scenario.name, "noise": noise, "inputs": inputs, "varied": {}}
+
+
+def test_cells_of_set_components_and_their_sigma_are_collected(tmp_path: Path) -> None:
+    """A cell whose dropout is set has the noise "default*"; scores of sigma are one entry of its row."""
+    row: dict[str, Any] = {"scenario": "accuracy_builtin.dropout_30", "noise": "default*", "inputs": "pos+ori"}
+    row["varied"] = {}
+    assert condition_of(row) in SETUP_CONDITIONS
+    row |= dict.fromkeys(CELL_METRICS, 1.0) | {"method": "m", "clip": "c", "behaviour": "b", "performer": "new"}
+    shares = {name: 0.5 + 0.25 * at for at, name in enumerate(COVERAGES)}
+    rows = [{**row, "seed": seed, "sigma_scores": shares} for seed in (2, 1)]
+    found = collect_errors(rows, tmp_path)["m"][str(condition_of(row))]["c"]
+    assert [found.mean(name) for name in COVERAGES] == [0.5, 0.75]
+
+
+def test_a_set_up_without_cells_is_refused() -> None:
+    last = str(SETUP_CONDITIONS[-1])
+    measured = {condition: by_clip for condition, by_clip in planted(1.0).items() if condition != last}
+    with pytest.raises(BadInput, match="no cell was measured"):
+        evaluate_setups("ours", measured, {"a": planted(1.0)}, COMMIT)
 
 
 def test_every_set_up_has_limits_or_none() -> None:
