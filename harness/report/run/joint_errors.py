@@ -6,6 +6,7 @@ import numpy as np
 
 from harness.compare import Sampling
 from harness.core.arrays import Floats
+from harness.core.estimate import HALF_WIDTH_95
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.number_format import format_number
 from harness.report.kit.axes import label_rows, set_root_scale
@@ -183,7 +184,7 @@ def error_against_sigma(run: RunData, series: str) -> Chart:
     return draw_chart(
         "sigma",
         f"Error of each hinge against its standard deviation, {series}",
-        f"{series}: bands to one and two times the mean standard deviation that it states. Boxes of the error from "
+        f"{series}: bands to the mean standard deviation and 95 % region that it states. Boxes of the error from "
         "quartile to quartile, lines at the median, whiskers at the 5th and 95th percentile of all scored frames. "
         "Right of each row: share of frames within one standard deviation of that frame. The axes have a square-root "
         "scale.",
@@ -194,9 +195,9 @@ def error_against_sigma(run: RunData, series: str) -> Chart:
 
 
 def _draw_bands(axes: Axes, sigma_deg: Floats) -> None:
-    """Bands (D,) from 0 to one and to two standard deviations [deg]."""
+    """Bands (D,) from 0 to one standard deviation and to the end of the 95 % region [deg]."""
     rows = np.arange(len(sigma_deg))
-    for times, alpha in ((2.0, 0.14), (1.0, 0.24)):
+    for times, alpha in ((HALF_WIDTH_95, 0.14), (1.0, 0.24)):
         axes.barh(rows, times * sigma_deg, height=0.94, color=COLOURS[1], alpha=alpha, linewidth=0)
 
 

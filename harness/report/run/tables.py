@@ -38,7 +38,7 @@ _COVERAGE = (
 )
 _SIGMA = (
     "Standard deviations that methods state for the hinge angles, pooled over the scored frames and the hinges of each "
-    "behaviour. Normal errors with the stated deviations would lie within one in 68 % and within two in 95 %. The log "
+    "behaviour. Of errors as stated 68 % lie within one, and 95 % within the region of 2.66 (Student's t). The log "
     "score is the mean negative logarithm of the stated normal density of the true angle, per degree: lower is better."
 )
 

@@ -5,13 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from harness.report.kit.page import DataTable
 from harness.report.kit.page_html import page_table
 from harness.report.kit.ranking import LAG_NOTE
 from harness.report.run.data import read_run
 from harness.report.run.headline import run_verdict
-from harness.report.run.joint_errors import error_against_sigma
+from harness.report.run.joint_errors import _draw_bands, error_against_sigma
 from harness.report.run.page import write_run_page
 from harness.report.run.tables import results_tables, sigma_table
 from harness.results import read_summary
@@ -111,3 +113,10 @@ def test_charts_draw_the_deviations(run_folder: Path) -> None:
     sigma_deg = np.concatenate([t.sigma_deg[t.scored] for t in run.traces if t.series == "gauss"])
     for share in np.mean(error_deg <= sigma_deg, axis=0):
         assert f">{100.0 * share:.0f} %<" in svg
+
+
+def test_bands_reach_to_one_sigma_and_to_the_end_of_the_95_percent_region() -> None:
+    axes = Figure().add_subplot()
+    _draw_bands(axes, np.array([2.0, 4.0]))
+    widths = sorted(bar.get_width() for bar in axes.patches if isinstance(bar, Rectangle))
+    np.testing.assert_allclose(widths, [2.0, 4.0, 2.6589 * 2.0, 2.6589 * 4.0])
