@@ -65,7 +65,7 @@ _HISTORY_RIDGE, _HISTORY_WIDTH, _HISTORY_SIGMA_RAD = 0.1, 1.0, math.radians(6.0)
 _STATED_AT_36, _STATED_POWER = 0.92, 0.4
 """Stated standard deviations over those of the posterior, for the 36 numbers of six stations; and the power by which
 the factor grows with fewer numbers. The posterior is too narrow in hinges that no station shows."""
-_STATED_BY_CALIBRATION = {"tpose": 1.5}
+_STATED_BY_CALIBRATION = {"tpose": 1.5, "poses": 1.27, "liu2011": 1.45, "kim2012": 2.0}
 """Further factor of calibrations whose mounts err."""
 FEATURES = 32
 """Number of features of readings and history."""
@@ -265,7 +265,7 @@ class ExpertMapSession(HistorySession):
             power = options.history_weight / math.sqrt(trust.inflation)
         self._product = _multiply((mean, covariance), trust.inflation, other, power)
         prior = _multiply_broad(self._product, self._broad, options.broad_weight * trust.newness)
-        return self._contact.constrain(prior, history)
+        return self._contact.constrain(prior, self._next_ground(), history)
 
 
 @compiled

@@ -171,7 +171,7 @@ def _root_jacobian(z: Floats) -> Floats:
 
 
 @compiled
-def _root_motion(z: Floats) -> Floats:
+def root_motion(z: Floats) -> Floats:
     """(7, 6) Jacobian of the root's motion in the tangent: x, y, yaw, height, tilt -> translation, rotation."""
     out, rotation = np.zeros((7, 6)), _root_jacobian(z)
     out[0, 0] = out[1, 1] = out[3, 2] = 1.0
@@ -191,7 +191,7 @@ def to_subspace(tree: KinematicTree, subspace: Subspace, z: Floats, rows: Floats
     same in both, so only the seven leading rows and the columns of the root are transformed, by the Jacobian of the
     root's motion. The root's directions are the first six ancestors of every hinge.
     """
-    jacobian, curvature = _root_motion(z), subspace.curvature
+    jacobian, curvature = root_motion(z), subspace.curvature
     half = np.zeros((7, 6))
     for k in range(7):
         for m in range(6):
@@ -222,7 +222,7 @@ def trace_of_product(tree: KinematicTree, z: Floats, rows: Floats, covariance: F
 
     These are brought to z as in `to_subspace`, without any prior.
     """
-    jacobian, total, twice = _root_motion(z), 0.0, 0.0
+    jacobian, total, twice = root_motion(z), 0.0, 0.0
     across = np.zeros((len(covariance), 6))  # the covariance with the tangent's root
     for i in range(len(covariance)):
         for k in range(7):
@@ -250,7 +250,7 @@ def trace_of_product(tree: KinematicTree, z: Floats, rows: Floats, covariance: F
 @compiled
 def descent_in_subspace(subspace: Subspace, z: Floats, descent: Floats, out: Floats) -> None:
     """Fill in the descent (3 + P,) of z, from that of the tangent (V,); the subspace's cost is added."""
-    jacobian = _root_motion(z)
+    jacobian = root_motion(z)
     pull = np.dot(subspace.curvature, z[3:] - subspace.mean)
     for k in range(7):
         out[k] = dot(jacobian[k], descent[:6])
