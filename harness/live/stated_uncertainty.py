@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.estimate import HALF_WIDTH_95
+from harness.core.estimate import HALF_WIDTH_95, mean_region_deg
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.number_format import format_fixed
 from harness.core.skeleton import Skeleton
@@ -19,7 +19,7 @@ def describe_uncertainty(skeleton: Skeleton, angle_sigma_rad: Floats | None) -> 
     if angle_sigma_rad is None:
         return "the method states no uncertainty"
     half_rad = HALF_WIDTH_95 * angle_sigma_rad[QPOS_OF_DOF]
-    mean, largest = (format_fixed(float(np.rad2deg(rad)), 1) for rad in (half_rad.mean(), half_rad.max()))
+    mean, largest = (format_fixed(float(d), 1) for d in (mean_region_deg(angle_sigma_rad), np.rad2deg(half_rad.max())))
     bone = skeleton.dof_names[int(half_rad.argmax())].partition(".")[0]
     if f"{'r' if bone[0] == 'l' else 'l'}{bone[1:]}" in skeleton.names:  # a bone of either side
         bone = f"{_SIDES[bone[0]]} {bone[1:]}"
