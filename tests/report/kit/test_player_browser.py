@@ -330,7 +330,7 @@ def test_a_method_that_states_its_uncertainty_has_it_beside_its_name_and_as_a_si
     assert texts[1] == "stated 95 % region [±°], 0 to 20"
     line = page.locator(".signals path").nth(1).get_attribute("d")
     heights = [float(point.split()[1]) for part in line.split("M") if part for point in part.split("L")]
-    assert (heights[0], heights[-1]) == (pytest.approx(30.0 - 28.0 * 0.2, abs=0.1), 2.0)
+    assert [heights[0], heights[-1]] == pytest.approx([30.0 - 28.0 * 0.2, 2.0], abs=0.1)
     assert line.count("M") == 2, "the frame without an estimate leaves a gap"
     page.keyboard.press("Home")
     page.wait_for_function("() => document.querySelector('.labels').innerText.includes('map 60 mm · stated ±4°')")
