@@ -1,6 +1,7 @@
 """The 3-D player in a browser: camera, time, methods next to each other, and links to a moment."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -49,11 +50,8 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
         solved = np.zeros(FRAMES, dtype=np.int64)
         states = np.where(np.arange(FRAMES) == LOST_FRAME, NO_ESTIMATE, 0)
         offsets = [np.array([0.0, 0.03 * n, 0.0]) for n in (1, 2, 3)]
-        regions_deg = [None, np.linspace(4.0, 20.0, FRAMES), None]
-        tracks = [
-            PlayerTrack(name, motion.joints_m + offset, states, region_deg)
-            for name, offset, region_deg in zip(METHODS, offsets, regions_deg, strict=True)
-        ]
+        tracks = [PlayerTrack(n, motion.joints_m + o, states) for n, o in zip(METHODS, offsets, strict=True)]
+        tracks[1] = replace(tracks[1], region_deg=np.linspace(4.0, 20.0, FRAMES))
         pose = np.tile([1.0, 0.0, 0.0, 0.0], (FRAMES, 1, 1))
         quality = np.where(np.arange(FRAMES) < FRAMES // 2, 1.0, 0.5)[:, None]
         stations = PlayerStations(("head",), motion.joints_m[:, 6:7], pose, solved[:, None], quality)
