@@ -3,14 +3,17 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from harness.core.humanoid24 import standard_skeleton
 from harness.core.number_format import format_fixed, format_share
 from harness.core.text_table import Table
-from harness.live import LiveResult
+from harness.live import LiveResult, describe_uncertainty
 
 
 def as_dict(result: LiveResult, jitter: Mapping[str, Any]) -> dict[str, Any]:
     """Counts, and times in milliseconds; `jitter` is the result of `JitterProbe.finish`."""
-    stages = result.stages
+    stages, sigma_rad = result.stages, result.mean_sigma_rad
     return {
         "seconds": result.seconds,
         "frames": result.captured,
@@ -18,6 +21,7 @@ def as_dict(result: LiveResult, jitter: Mapping[str, Any]) -> dict[str, Any]:
         "poses": result.poses,
         "status": result.status,
         "origin": result.origin,
+        "sigma_width_deg": None if sigma_rad is None else float(np.rad2deg(sigma_rad.mean())),
         "deadline_ms": 1e3 * stages.deadline_s,
         "deadline_missed": stages.missed,
         "lag_frames": result.lag_frames,
@@ -42,9 +46,10 @@ def lines(result: LiveResult, jitter: Mapping[str, Any]) -> list[str]:
     counts = f"{result.poses} poses in {result.seconds:.1f} s ({states}); {result.dropped} frames dropped"
     share = stages.missed / result.poses if result.poses else 0.0
     late = f"{stages.missed} poses ({format_share(share, 2)}) after their deadline, {1e3 * stages.deadline_s:.2f} ms"
+    stated = [describe_uncertainty(standard_skeleton(), result.mean_sigma_rad)] if result.poses else []
     failed = [f"{name}: {why}" for name, why in result.failed.items()]
     table = Table(["milliseconds", "p50", "p99", "max"], rows)
-    return [*table.lines(), "", counts, late, *failed]
+    return [*table.lines(), "", counts, *stated, late, *failed]
 
 
 _JITTER_LABELS = {

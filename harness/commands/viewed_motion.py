@@ -8,6 +8,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
+from harness.core.estimate import mean_region_deg
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.motion import Clip
 from harness.core.progress import ProgressCallback
@@ -175,7 +176,11 @@ def _view_recording(
         joints_m[: len(poses.joints_m)] = poses.joints_m
         states = np.full(count, NO_ESTIMATE)
         states[: len(poses.joints_m)] = one.answers.status
-        tracks.append(PlayerTrack(one.method, hold_last(joints_m), states))
+        region_deg, sigma_rad = np.full(count, np.nan), one.answers.angle_sigma_rad
+        if sigma_rad is not None:
+            region_deg[: len(sigma_rad)] = mean_region_deg(sigma_rad)
+        region = None if sigma_rad is None else hold_last(region_deg)
+        tracks.append(PlayerTrack(one.method, hold_last(joints_m), states, region))
     room = playback.calibration
     stations = _stations(stream.stations, take.frames, room.world_from_tracker, room.tracker_origin_m)
     heading_rad = rotations.mean_heading_rad(truth.world_from_root)

@@ -150,6 +150,12 @@ def check_sigma(angle_sigma_rad: Floats) -> None:
         raise ValueError(f"{found}; it must be above 0, at least {MIN_SIGMA_RAD:.3g}, and below {MAX_POSE_VALUE:g}")
 
 
+def mean_region_deg(angle_sigma_rad: Floats) -> Floats:
+    """Half width of the stated 95 % region [deg], mean over hinges, of standard deviations (..., 48) [rad]."""
+    out: Floats = np.rad2deg(HALF_WIDTH_95 * np.mean(angle_sigma_rad, axis=-1))
+    return out
+
+
 def answer_lag(answer: Any) -> int:
     """Lag of what a method answered [frames], which may be an object of its own; 0 where it has none."""
     return int(getattr(answer, "lag", 0))

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from harness.live.scheduling_jitter import JitterProbe
     from harness.live.session import LiveOptions, LiveResult, run_session, warm_up
     from harness.live.session_control import SessionControl
+    from harness.live.stated_uncertainty import describe_uncertainty
     from harness.live.viewer import ViewerOutput
     from harness.live.vmc import VmcOutput
 else:
@@ -27,6 +28,7 @@ __all__ = [
     "SessionSetup",
     "ViewerOutput",
     "VmcOutput",
+    "describe_uncertainty",
     "draw_poses",
     "open_outputs",
     "run_session",

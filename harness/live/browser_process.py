@@ -18,6 +18,7 @@ from harness.live.live_statistics import LiveStatistics
 from harness.live.page_calibration import PageCalibration, joints_mm
 from harness.live.pose import SessionSetup
 from harness.live.shared_memory import PoseRing
+from harness.live.stated_uncertainty import bone_reach_m, describe_uncertainty
 from harness.view import Command, LiveContent, ViewServer
 
 _RATE_HZ = 30.0
@@ -68,6 +69,7 @@ def run_browser(setup: SessionSetup, ring: PoseRing, folder: str, pipe: Any) -> 
     token, link = secrets.token_urlsafe(24), SessionLink(pipe)
     content = LiveContent(setup.title, setup.skeleton, setup.stations, tuple(setup.calibrations))
     statistics, seen, status_s = LiveStatistics(setup.stations, time.monotonic), 0, 0.0
+    uncertainty = ""
     commands: dict[str, Command] = {}
     with ViewServer(content.find, commands, token=token) as server:
 
@@ -90,11 +92,14 @@ def run_browser(setup: SessionSetup, ring: PoseRing, folder: str, pipe: Any) -> 
                     calibration.add(frame)
                     statistics.add(frame, Status(int(head[3])), float(head[2]))
                 if len(records):
-                    server.publish("frame", _frame(setup, records[-1:], stations[-1]))
+                    server.publish("frame", _frame(setup, records[-1], stations[-1]))
+                    uncertainty = describe_uncertainty(setup.skeleton, PoseRing.sigma(records[-1]))
                 statistics.update()
                 if (now_s := time.monotonic()) - status_s >= _STATUS_PERIOD_S:
                     status_s = now_s
-                    server.publish("status", {**statistics.page_content(), **link.recording})
+                    server.publish(
+                        "status", {**statistics.page_content(), **link.recording, "uncertainty": uncertainty}
+                    )
         except (EOFError, ConnectionError):  # the session has closed the pipe, or was killed
             return
 
@@ -109,8 +114,9 @@ def _calibrate(calibration: PageCalibration, wanted: Mapping[str, Any]) -> Mappi
 
 
 def _frame(setup: SessionSetup, record: Floats, stations: Floats) -> dict[str, Any]:
-    """A frame for the page: joints [mm], and of each station its pose."""
-    room, poses = PoseRing.room(record[0]), list[list[int] | None]()
+    """A frame for the page: joints [mm], of each station its pose, and of each bone how far its end may be off [mm]."""
+    sigma_rad = PoseRing.sigma(record)
+    room, poses = PoseRing.room(record), list[list[int] | None]()
     for columns in stations:
         poses.append(None)
         if room is not None and (columns[8:10] > 0.0).all():
@@ -118,7 +124,10 @@ def _frame(setup: SessionSetup, record: Floats, stations: Floats) -> dict[str, A
             turn = rotations.multiply(room[1], columns[3:7])
             poses[-1] = np.rint(1e3 * np.concatenate([at_m, turn])).astype(int).tolist()
     return {
-        "number": int(record[0, 0]),
-        "joints_mm": joints_mm(setup.skeleton, PoseRing.qpos(record)[0]),
+        "number": int(record[0]),
+        "joints_mm": joints_mm(setup.skeleton, PoseRing.qpos(record[None])[0]),
         "stations": poses,
+        "reach_mm": None
+        if sigma_rad is None
+        else np.rint(1e3 * bone_reach_m(setup.skeleton, sigma_rad)).astype(int).tolist(),
     }

@@ -16,8 +16,9 @@ import numpy as np
 from harness.body import Body, Kinematics
 from harness.calibrate import Notifier
 from harness.core import rotations
+from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.core.estimate import Estimate, Origin, Status
+from harness.core.estimate import HINGE_COUNT, Estimate, Origin, Status
 from harness.core.number_format import count_noun
 from harness.errors import BadInput
 from harness.live.capture import CaptureThread, DroppingQueue
@@ -72,6 +73,8 @@ class LiveResult:
     """Number of frames by which the method answers later than it could, see `core.estimate.Estimate.lag`."""
     lag_s: float = 0.0
     """The lag times the expected frame period [s]. No stage contains it, but every pose is so much older."""
+    sigma_sum_rad: Floats = field(default_factory=lambda: np.zeros(HINGE_COUNT))
+    """(48,) sums of the stated standard deviations of all poses, in the order of `qpos` [rad]; 0 if none are stated."""
     stopped: bool = False
     """Whether Ctrl-C or another signal ended the session."""
 
@@ -83,6 +86,11 @@ class LiveResult:
     @property
     def poses(self) -> int:
         return sum(self.status.values())
+
+    @property
+    def mean_sigma_rad(self) -> Floats | None:
+        """(48,) mean stated standard deviation of each hinge angle [rad]; None if none are stated."""
+        return self.sigma_sum_rad / self.poses if self.sigma_sum_rad.any() else None
 
 
 def warm_up(reconstructor: Reconstructor, calibration: Calibration, frames: Sequence[TrackerFrame]) -> None:
@@ -255,6 +263,8 @@ class _SolverThread:
             self._statistics.add(frame, estimate.status, ready_s - frame.received_s)
             done.status[estimate.status.name.lower()] += 1
             done.origin[estimate.origin.name.lower()] += 1
+            if estimate.angle_sigma_rad is not None:
+                done.sigma_sum_rad += estimate.angle_sigma_rad
             self._first_s = self._first_s or ready_s
             done.seconds = ready_s - self._first_s
             number += 1

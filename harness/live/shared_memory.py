@@ -86,7 +86,9 @@ class SharedPose:
             return np.array(self._memory)
 
 
-_HEAD, _QPOS, _ROOM, _STATION = 4, 55, 7, 11
+_POSE, _SIGMA, _ROOM = slice(4, 59), slice(59, 107), slice(107, 114)
+"""Places of configuration, standard deviations and room in a record of `PoseRing`; the stations follow."""
+_STATION = 11
 _CAPACITY = 1024
 """Frames: 8 s at 120 Hz."""
 
@@ -95,15 +97,16 @@ class PoseRing:
     """The last 1024 frames of S stations. One process writes and one reads; neither waits for the other.
 
     A record is: number, time at which the pose was ready [s], time from the frame's last byte to it [s], status, the
-    configuration (55,), the tracker's origin (3,) [m] and orientation (4,) in the world, NaN where they are not known,
-    and for each station position (3,) [m] and orientation (4,) in the tracker's frame, quality, whether position and
-    orientation are valid, and whether the reading is suspect.
+    configuration (55,), the stated standard deviations (48,) [rad], the tracker's origin (3,) [m] and orientation (4,)
+    in the world, and for each station position (3,) [m] and orientation (4,) in the tracker's frame, quality, whether
+    position and orientation are valid, and whether the reading is suspect. Standard deviations that the method does not
+    state, and an unknown room, are NaN.
     """
 
     def __init__(self, context: Any, stations: int) -> None:
         """`context` is a `multiprocessing` context."""
         self.stations = stations
-        self.size = _HEAD + _QPOS + _ROOM + _STATION * stations
+        self.size = _ROOM.stop + _STATION * stations
         self._records = context.RawArray("d", _CAPACITY * self.size)
         self._written = context.RawValue("q", 0)
         self._rows: Floats | None = None
@@ -116,11 +119,12 @@ class PoseRing:
         """Write a frame over the oldest one."""
         frame, count = pose.frame, self._written.value
         record = self._view()[count % _CAPACITY]
-        record[:_HEAD] = pose.number, pose.ready_s, pose.ready_s - frame.received_s, pose.estimate.status
-        record[_HEAD : _HEAD + _QPOS] = pose.estimate.qpos
-        room = record[_HEAD + _QPOS :][:_ROOM]
+        record[: _POSE.start] = pose.number, pose.ready_s, pose.ready_s - frame.received_s, pose.estimate.status
+        sigma_rad = pose.estimate.angle_sigma_rad
+        record[_POSE], record[_SIGMA] = pose.estimate.qpos, np.nan if sigma_rad is None else sigma_rad
+        room = record[_ROOM]
         room[:3], room[3:] = (np.nan, np.nan) if pose.room is None else pose.room
-        stations = record[_HEAD + _QPOS + _ROOM :].reshape(self.stations, _STATION)
+        stations = record[_ROOM.stop :].reshape(self.stations, _STATION)
         stations[:, :3], stations[:, 3:7], stations[:, 7] = frame.position_m, frame.tracker_from_station, frame.quality
         stations[:, 8], stations[:, 9] = frame.position_valid, frame.orientation_valid
         stations[:, 10] = frame.suspect
@@ -145,18 +149,23 @@ class PoseRing:
     @staticmethod
     def qpos(records: Floats) -> Floats:
         """(N, 55) configurations of records."""
-        out: Floats = records[:, _HEAD : _HEAD + _QPOS]
+        out: Floats = records[:, _POSE]
         return out
+
+    @staticmethod
+    def sigma(record: Floats) -> Floats | None:
+        """(48,) stated standard deviations of one record [rad]; None if the method states none."""
+        return None if np.isnan(record[_SIGMA]).any() else record[_SIGMA]
 
     @staticmethod
     def room(record: Floats) -> tuple[Floats, Floats] | None:
         """The tracker's origin (3,) [m] and orientation (4,) in the world, of one record; None if not known."""
-        room = record[_HEAD + _QPOS :][:_ROOM]
+        room = record[_ROOM]
         return None if np.isnan(room).any() else (room[:3], room[3:])
 
     def station_columns(self, records: Floats) -> Floats:
         """(N, S, 11) columns of the stations of records."""
-        out: Floats = records[:, _HEAD + _QPOS + _ROOM :].reshape(len(records), self.stations, _STATION)
+        out: Floats = records[:, _ROOM.stop :].reshape(len(records), self.stations, _STATION)
         return out
 
     @staticmethod

@@ -56,6 +56,11 @@
         labels.push([body.stations[n], [x, y, z], stations[n].colour]);
       });
       parts.push({ capsules: worn, opacity: 1, girth: 1 });
+      const region = new MotionRenderer.Capsules(), reach = frame.reach_mm || [], moved = (values) => values.filter((_, n) => reach[n]);
+      const radii_mm = moved(body.radii_mm.map(([start, end], n) => [start, end + reach[n]]));
+      MotionRenderer.addBody(region, { bones: moved(body.bones), radii_mm }, point, () => MotionRenderer.rgb(css("--faint")));
+      parts.push({ capsules: region, opacity: 0.3, girth: 1, shadowless: true });
+      find("uncertainty").querySelector("i").hidden = !frame.reach_mm;
     } else return;
     const ratio = Math.min(2, devicePixelRatio || 1), look = MotionRenderer.look();
     canvas.width = Math.round(stage.clientWidth * ratio);
@@ -116,6 +121,7 @@
     setWord(find("session"), status.session, status.why);
     redraw();
     stations.forEach(({ row }, n) => setWord(row.querySelector(".word"), status.stations[n]));
+    find("uncertainty").querySelector("output").textContent = status.uncertainty;
     recording = status.recording || "";
     find("record").textContent = recording ? "Stop recording" : "Record";
     if (status.failure) say(`the recording has ended: ${status.failure}`);

@@ -82,6 +82,7 @@ def _page(title: str, stations: Sequence[str], calibrations: Sequence[str]) -> b
         id_="calibration",
         hidden=True,
     )
+    uncertainty = tag("p", tag("i", hidden=True), tag("output"), id_="uncertainty")
     return viewer_page(
         title,
         "harness live",
@@ -91,7 +92,7 @@ def _page(title: str, stations: Sequence[str], calibrations: Sequence[str]) -> b
         tag("p", reader, id_="reader", hidden=True),
         tag(
             "main",
-            tag("div", calibration, player_element("The body and its stations in 3-D; drag to turn")),
+            tag("div", calibration, player_element("The body and its stations in 3-D; drag to turn"), uncertainty),
             tag(
                 "section",
                 tag("h2", "Stations and their quality"),

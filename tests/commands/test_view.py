@@ -62,11 +62,16 @@ def test_a_run_has_its_methods_the_best_first_or_the_chosen_ones(viewed: Path) -
 
 
 def test_a_recording_has_readings_truth_and_estimates(simulated: Path) -> None:
-    motion = opened(simulated, ["ik"], scenario="demo", clip=CLIP)
+    motion = opened(simulated, ["ik", "expert_map"], scenario="demo", clip=CLIP)
     clip = motion.clip(0)
     assert clip.truth is not None
     assert clip.stations is not None
-    assert [track.name for track in clip.estimates] == ["ik"]
+    assert [track.name for track in clip.estimates] == ["ik", "expert_map"]
+    none, region_deg = (track.region_deg for track in clip.estimates)
+    assert none is None
+    assert region_deg is not None
+    assert region_deg.shape == clip.time_s.shape
+    assert 2.0 < np.median(region_deg) < 20.0
     assert (clip.truth.states == 0).all()
     assert (clip.estimates[0].states != NO_ESTIMATE).all()
     off_m = np.linalg.norm(clip.estimates[0].joints_m - clip.truth.joints_m, axis=2)

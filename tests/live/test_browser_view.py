@@ -31,6 +31,7 @@ from harness.live.pose import SessionSetup
 from harness.live.session import LiveOptions, run_session
 from harness.live.session_control import SessionControl
 from harness.live.shared_memory import PoseRing
+from harness.live.stated_uncertainty import bone_reach_m, describe_uncertainty
 from harness.live.viewer import _run_viewer_process
 from harness.simulate import simulate_tracker
 from harness.stream import TrackerFrame
@@ -125,6 +126,22 @@ def test_the_page_gets_the_newest_pose(shown: BrowserOutput, rng: np.random.Gene
     assert frame["stations"] == [[0, 0, 2500, 1000, 0, 0, 0]] * 2
     shown.send(live_pose(qpos, 200, time.monotonic(), kinematics))
     assert wait_for_frame(shown, 200)["stations"] == [None, None], "where the room is not known"
+
+
+def test_the_page_gets_the_stated_uncertainty(shown: BrowserOutput, rng: np.random.Generator) -> None:
+    assert newest(shown, "status")["uncertainty"] == "", "before the first pose"
+    pose = live_pose(configuration(rng), 0, time.monotonic())
+    sigma_rad = rng.uniform(0.02, 0.1, 48)
+    for number, stated in enumerate((None, sigma_rad)):
+        estimate = replace(pose.estimate, angle_sigma_rad=stated)
+        shown.send(replace(pose, number=number, estimate=estimate))
+        reach_mm = wait_for_frame(shown, number)["reach_mm"]
+        until_s, text = time.monotonic() + 20.0, describe_uncertainty(BODY.skeleton, stated)
+        while (said := newest(shown, "status")["uncertainty"]) != text:
+            assert time.monotonic() < until_s, said
+            time.sleep(0.05)
+        assert (reach_mm is None) == (stated is None)
+    np.testing.assert_allclose(reach_mm, 1e3 * bone_reach_m(BODY.skeleton, sigma_rad), atol=0.5)
 
 
 def test_a_line_that_falls_silent_is_reported_within_a_second(shown: BrowserOutput, rng: np.random.Generator) -> None:

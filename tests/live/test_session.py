@@ -5,6 +5,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -182,6 +183,26 @@ def test_live_estimates_are_those_of_a_run(worn: Playback) -> None:
     for pose, estimate in zip(output.poses, offline, strict=True):
         np.testing.assert_array_equal(pose.estimate.qpos, estimate.qpos)
         assert (pose.estimate.status, pose.estimate.origin) == (estimate.status, estimate.origin)
+
+
+class Unsure(Counting):
+    """States standard deviations of as many degrees as it has answers."""
+
+    def step(self, frame: TrackerFrame) -> Estimate:
+        return replace(super().step(frame), angle_sigma_rad=np.full(48, np.deg2rad(len(self.seen))))
+
+
+def test_the_summary_has_the_mean_stated_standard_deviation() -> None:
+    plan = LiveOptions(100.0, queue_frames=99)
+    done = performed(Paced(frames(5), 0.005), Unsure(), plan=plan)
+    assert live_summary.as_dict(done, {})["sigma_width_deg"] == pytest.approx(3.0)
+    (line,) = [line for line in live_summary.lines(done, {}) if "95 % region" in line]
+    assert line.startswith("stated 95 % region of hinge angles: ±8.0° on average")
+    done = performed(Paced(frames(5), 0.005), Counting(), plan=plan)
+    assert live_summary.as_dict(done, {})["sigma_width_deg"] is None
+    assert "the method states no uncertainty" in live_summary.lines(done, {})
+    without_poses = live_summary.lines(LiveResult(done.stages), {})
+    assert not any("uncertainty" in line for line in without_poses)
 
 
 class Late(Counting):

@@ -40,6 +40,16 @@ def test_the_room_of_a_frame_comes_with_it(rng: np.random.Generator) -> None:
     np.testing.assert_array_equal(np.concatenate(back), np.concatenate(room))
 
 
+def test_the_stated_standard_deviations_of_a_frame_come_with_it(rng: np.random.Generator) -> None:
+    ring, sigma_rad = PoseRing(get_context("spawn"), 2), rng.uniform(0.01, 0.2, 48)
+    pose = live_pose(configuration(rng), kinematics=KINEMATICS)
+    ring.put(replace(pose, estimate=replace(pose.estimate, angle_sigma_rad=sigma_rad)))
+    ring.put(pose)
+    stated, none = ring.read(0)[1]
+    np.testing.assert_array_equal(PoseRing.sigma(stated), sigma_rad)
+    assert PoseRing.sigma(none) is None
+
+
 def test_a_reader_gets_every_frame_once(rng: np.random.Generator) -> None:
     ring, qpos, seen, numbers = PoseRing(get_context("spawn"), 2), configuration(rng), 0, []
     for number in range(3000):

@@ -24,12 +24,13 @@ TPOSE = tpose(SKELETON)
 JOINTS_MM = np.rint(1e3 * np.concatenate([TPOSE[None, :3], pose_from_qpos(SKELETON, TPOSE[None]).end_m[0]]))
 
 
-def frame(number: int) -> dict[str, Any]:
+def frame(number: int, reach_mm: list[int] | None = None) -> dict[str, Any]:
     joints_mm = JOINTS_MM.astype(int).ravel().tolist()
     return {
         "number": number,
         "joints_mm": joints_mm,
         "stations": [[0, 0, 1500, 1000, 0, 0, 0], None],
+        "reach_mm": reach_mm,
     }
 
 
@@ -38,7 +39,7 @@ def status(word: str = "OK", why: str = "no reading of torso", **more: Any) -> d
         {"rate_hz": 40.0, "p50_ms": 1.5, "p99_ms": 4.0, "loss": 0.25, "quality": [0.9, 0.1 * n]} for n in range(3)
     ]
     stations = ["OK", "LOST"]
-    return {"seconds": seconds, "session": word, "why": why, "stations": stations, **more}
+    return {"seconds": seconds, "session": word, "why": why, "stations": stations, "uncertainty": "", **more}
 
 
 def posing(number: int, share: float) -> dict[str, Any]:
@@ -140,6 +141,43 @@ def test_the_page_follows_the_session(tab: Any, server: ViewServer) -> None:
     assert tab.inner_text("#session span") == "no data for 0.9 s"
     server.board.close()
     wait_for_text(tab, "#session span", "the session has ended")
+
+
+PIXELS = """() => {
+  const c = document.querySelector("#player canvas"), gl = c.getContext("webgl2");
+  const out = new Uint8Array(4 * c.width * c.height), last = window.seen || out;
+  gl.readPixels(0, 0, c.width, c.height, gl.RGBA, gl.UNSIGNED_BYTE, out);
+  window.seen = out;
+  const changed = [0, 0, 0, 0], half = (share) => Math.floor(2 * share);
+  for (let i = 0; i < out.length; i += 4) {
+    if (out[i] !== last[i]) changed[2 * half(i / out.length) + half(((i / 4) % c.width) / c.width)] += 1;
+  }
+  return changed;
+}"""
+"""Numbers of pixels whose red is not that of the last call: below left and right, above left and right."""
+
+
+def test_the_stated_uncertainty_is_drawn_about_the_bones(tab: Any, server: ViewServer) -> None:
+    """The left arm alone is uncertain; the performer faces the camera, so it is on the right of the picture."""
+
+    def draw(number: int, arm_mm: int, text: str) -> list[int]:
+        reach_mm = [arm_mm * (name == "lhumerus") for name in SKELETON.names] if arm_mm else None
+        server.publish("status", status(uncertainty=text))
+        wait_for_text(tab, "#uncertainty output", text)
+        server.publish("frame", frame(number, reach_mm))
+        tab.wait_for_selector(f"#player[data-drawn='{number}']", timeout=30_000)
+        changed: list[int] = tab.evaluate(PIXELS)
+        return changed
+
+    draw(1, 0, "none")
+    assert draw(2, 0, "none again") == [0, 0, 0, 0]
+    *narrow_elsewhere, narrow = draw(3, 1, "stated")
+    assert tab.is_visible("#uncertainty i")
+    draw(4, 0, "none at last")
+    assert not tab.is_visible("#uncertainty i")
+    *wide_elsewhere, wide = draw(5, 150, "stated again")
+    assert narrow_elsewhere == wide_elsewhere == [0, 0, 0], "the region is that of the arm alone, without a shadow"
+    assert wide > 2 * narrow > 0
 
 
 def test_no_text_is_small_and_words_can_be_read(tab: Any, server: ViewServer) -> None:

@@ -174,8 +174,9 @@ const MotionPlayer = (() => {
     }
 
     async #track(track, progress) {
-      const [joints, states] = await Promise.all([this.data.joints(track.joints, progress), this.data.array(track.states, 1)]);
-      return { name: track.name, joints: joints.values, columns: joints.columns, states: states.values };
+      const [joints, states, region] = await Promise.all([this.data.joints(track.joints, progress), this.data.array(track.states, 1),
+        track.region && this.data.array(track.region, 0.1)]);
+      return { name: track.name, joints: joints.values, columns: joints.columns, states: states.values, region: region && region.values };
     }
 
     // Load the chosen methods, each once.
@@ -216,12 +217,14 @@ const MotionPlayer = (() => {
       this.redraw();
     }
 
-    // Under the time line: the mean error of each method, the lowest quality of a station, the share of stations with readings.
+    // Under the time line: the mean error of each method, its stated region, the lowest quality of a station, the share of stations with readings.
     #showSignals() {
       const last = this.time.length - 1, every = Math.max(1, Math.ceil(last / MOST_POINTS)), frames = [], signals = [];
       for (let frame = 0; frame <= last; frame += every) frames.push(frame);
       const errors = this.reference ? this.shown.map((track, n) => [METHODS[n], frames.map((frame) => this.#meanErrorMm(track, frame))]) : [];
       if (errors.length) signals.push(["error [mm]", Math.max(1, ...errors.flatMap(([, values]) => values)), errors]);
+      const regions = this.shown.flatMap((track, n) => (track.region ? [[METHODS[n], frames.map((frame) => this.#region(track, frame))]] : []));
+      if (regions.length) signals.push(["stated 95 % region [±°]", Math.max(1, ...regions.flatMap(([, values]) => values)), regions]);
       if (this.worn) {
         const count = this.worn.names.length, row = (values, frame) => values.subarray(count * frame, count * (frame + 1));
         const present = frames.map((frame) => (100 * row(this.worn.states, frame).filter((state) => state < 2).length) / count);
@@ -235,6 +238,11 @@ const MotionPlayer = (() => {
         box.append(make("i", {}));
         return make("div", {}, make("span", { textContent: `${text}, 0 to ${most.toFixed(0)}` }), box);
       }));
+    }
+
+    // Mean half width of the stated 95 % region [deg]; null without an estimate or where none is stated.
+    #region(track, frame) {
+      return track.region && track.states[frame] !== NO_ESTIMATE ? track.region[frame] : null;
     }
 
     // Mean over joints; null without an estimate or without the truth.
@@ -421,8 +429,9 @@ const MotionPlayer = (() => {
       const text = (track) => {
         const state = track.states[this.frame], name = make("b", { textContent: track.name });
         name.style.color = METHODS[this.shown.indexOf(track)];
-        const mean = this.#meanErrorMm(track, this.frame);
-        return make("span", {}, name, `${mean === null ? "" : ` ${mean.toFixed(0)} mm`}${STATES[state] || ""}`);
+        const mean = this.#meanErrorMm(track, this.frame), region = this.#region(track, this.frame);
+        const stated = region === null ? "" : ` · stated ±${region.toFixed(0)}°`;
+        return make("span", {}, name, `${mean === null ? "" : ` ${mean.toFixed(0)} mm`}${stated}${STATES[state] || ""}`);
       };
       this.labels.style.gridTemplate = `repeat(${down}, 1fr) / repeat(${across}, 1fr)`;
       this.labels.replaceChildren(...views.map((tracks) => make("div", {}, ...tracks.map(text), ...this.#stationNames(across, down))));

@@ -54,6 +54,8 @@ class PlayerTrack:
     """(F, J, 3) joint centres: the root, then the far end of each bone [m]."""
     states: Ints
     """(F,) 0 solved, 1 held, 2 lost, 3 no estimate; joint centres of state 3 are not drawn."""
+    region_deg: Floats | None = None
+    """(F,) mean half width of the stated 95 % region of the hinge angles [deg]; None if none is stated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +191,9 @@ def pack_clip(skeleton: Skeleton, clip: PlayerClip, write: ChunkWriter, chunk_fr
 
     def track(role: str, content: PlayerTrack) -> dict[str, Any]:
         joints = _relative_mm(skeleton, content.joints_m)
-        return {"name": content.name, "role": role, "joints": chunks(joints), "states": chunks(content.states)}
+        region = None if content.region_deg is None else chunks(10.0 * content.region_deg)
+        states = chunks(content.states)
+        return {"name": content.name, "role": role, "joints": chunks(joints), "states": states, "region": region}
 
     tracks = [track("truth", clip.truth)] if clip.truth else []
     tracks += [track("estimate", estimate) for estimate in clip.estimates]

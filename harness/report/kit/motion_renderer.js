@@ -144,7 +144,7 @@ const MotionRenderer = (() => {
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
     }
 
-    // Draw one view into the box [x, y, width, height] of the canvas. Each body is { capsules, opacity, girth }.
+    // Draw one view into the box [x, y, width, height] of the canvas. Each body is { capsules, opacity, girth, shadowless }.
     draw(box, camera, look, bodies) {
       const { gl } = this, matrix = camera.matrix(box[2] / box[3]);
       gl.enable(gl.SCISSOR_TEST);
@@ -178,7 +178,7 @@ const MotionRenderer = (() => {
       gl.enable(gl.STENCIL_TEST);
       gl.stencilFunc(gl.EQUAL, 0, 255);
       gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
-      for (const body of bodies) this.#instances(body);
+      for (const body of bodies.filter(({ shadowless }) => !shadowless)) this.#instances(body);
       gl.disable(gl.STENCIL_TEST);
       gl.uniform1i(this.solid.at("shadow"), 0);
     }

@@ -8,6 +8,7 @@ import numpy as np
 from harness.body import DEFAULT_MOUNTS, Mount, locate_mount
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints
+from harness.core.estimate import mean_region_deg
 from harness.core.humanoid24 import standard_skeleton
 from harness.report.kit.motion_player import (
     NO_ESTIMATE,
@@ -172,7 +173,11 @@ def _estimate(series: str, frames: _Frames, count: int) -> PlayerTrack:
     joints_m[frames.places] = frames.estimate.joints_m
     states = np.full(count, NO_ESTIMATE)
     states[frames.places] = frames.cell.status[frames.rows]
-    return PlayerTrack(series, hold_last(joints_m), states)
+    if (sigma_rad := frames.cell.angle_sigma_rad) is None:
+        return PlayerTrack(series, hold_last(joints_m), states)
+    region_deg = np.full(count, np.nan)
+    region_deg[frames.places] = mean_region_deg(sigma_rad[frames.rows])
+    return PlayerTrack(series, hold_last(joints_m), states, hold_last(region_deg))
 
 
 def _stations(frames: Sequence[_Frames], count: int) -> PlayerStations | None:

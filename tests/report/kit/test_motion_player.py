@@ -20,6 +20,7 @@ from harness.report.kit.motion_player import (
 )
 
 FRAMES, JOINTS = 50, 25
+REGION_DEG = np.linspace(5.0, 20.0, FRAMES)
 
 
 def decode(data: bytes) -> Ints:
@@ -36,7 +37,7 @@ def motion(rng: np.random.Generator) -> PlayerMotion:
     """A clip of a truth and two estimates that walk randomly, with two stations."""
     joints_m = rng.normal(size=(1, JOINTS, 3)) + np.cumsum(0.01 * rng.normal(size=(FRAMES, JOINTS, 3)), axis=0)
     solved = np.zeros(FRAMES, dtype=np.int64)
-    estimates = [PlayerTrack(name, joints_m + offset, solved) for name, offset in (("ik", 0.05), ("<b>", 0.1))]
+    estimates = [PlayerTrack("ik", joints_m + 0.05, solved), PlayerTrack("<b>", joints_m + 0.1, solved, REGION_DEG)]
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (FRAMES, 2, 1))
     states, quality = np.zeros((FRAMES, 2), dtype=np.int64), np.ones((FRAMES, 2))
     stations = PlayerStations(("head", "torso"), joints_m[:, :2], turn, states, quality)
@@ -80,6 +81,8 @@ def test_joints_come_back_within_half_a_millimetre(chunk_frames: int, rng: np.ra
         for start, end in packed["bones"]:
             joints_mm[:, end] += joints_mm[:, start]
         np.testing.assert_allclose(joints_mm, 1e3 * source.joints_m, atol=0.5 + 1e-9)
+    assert [track["region"] is None for track in clip["tracks"]] == [True, True, False]
+    np.testing.assert_allclose(unpack(clip["tracks"][2]["region"], store)[:, 0], REGION_DEG * 10.0, atol=0.5 + 1e-9)
     poses = unpack(clip["stations"]["poses"], store).reshape(FRAMES, 2, 7)
     assert made.clips[0].stations is not None
     np.testing.assert_allclose(poses[..., :3], 1e3 * made.clips[0].stations.position_m, atol=0.5 + 1e-9)

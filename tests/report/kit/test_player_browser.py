@@ -1,6 +1,7 @@
 """The 3-D player in a browser: camera, time, methods next to each other, and links to a moment."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,7 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
         states = np.where(np.arange(FRAMES) == LOST_FRAME, NO_ESTIMATE, 0)
         offsets = [np.array([0.0, 0.03 * n, 0.0]) for n in (1, 2, 3)]
         tracks = [PlayerTrack(n, motion.joints_m + o, states) for n, o in zip(METHODS, offsets, strict=True)]
+        tracks[1] = replace(tracks[1], region_deg=np.linspace(4.0, 20.0, FRAMES))
         pose = np.tile([1.0, 0.0, 0.0, 0.0], (FRAMES, 1, 1))
         quality = np.where(np.arange(FRAMES) < FRAMES // 2, 1.0, 0.5)[:, None]
         stations = PlayerStations(("head",), motion.joints_m[:, 6:7], pose, solved[:, None], quality)
@@ -218,7 +220,7 @@ def test_three_methods_stand_next_to_each_other(page: Any) -> None:
     labels = page.locator(".labels > div").all_inner_texts()
     assert [text.split() for text in labels] == [
         ["ik", "30", "mm", "head"],
-        ["map", "60", "mm", "head"],
+        ["map", "60", "mm", "·", "stated", "±4°", "head"],
         ["pca", "90", "mm", "head"],
     ]
     page.locator("input[name=errors]").check()
@@ -317,6 +319,22 @@ def test_signals_lie_under_the_time_line_and_lead_to_their_moment(page: Any) -> 
     box = page.locator(".signal").nth(1).bounding_box()
     page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 10)
     assert page.evaluate("player.player.frame") == pytest.approx(0.5 * (FRAMES - 1), abs=2)
+
+
+def test_a_method_that_states_its_uncertainty_has_it_beside_its_name_and_as_a_signal(page: Any) -> None:
+    page.select_option("select[name=method0]", "map")
+    page.wait_for_function("() => document.querySelectorAll('.signal').length === 4")
+    texts = page.locator(".signals > div > span").all_inner_texts()
+    assert texts[1] == "stated 95 % region [±°], 0 to 20"
+    line = page.locator(".signals path").nth(1).get_attribute("d")
+    heights = [float(point.split()[1]) for part in line.split("M") if part for point in part.split("L")]
+    assert [heights[0], heights[-1]] == pytest.approx([30.0 - 28.0 * 0.2, 2.0], abs=0.1)
+    assert line.count("M") == 2, "the frame without an estimate leaves a gap"
+    page.keyboard.press("Home")
+    page.wait_for_function("() => document.querySelector('.labels').innerText.includes('map 60 mm · stated ±4°')")
+    page.locator(".motion-player input[type=range]").fill(str(LOST_FRAME))
+    page.wait_for_function("n => player.dataset.drawn === String(n)", arg=LOST_FRAME)
+    assert "stated" not in page.locator(".labels").inner_text()
 
 
 def test_stations_have_their_names_where_they_are(page: Any) -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from harness.body import DEFAULT_MOUNTS, Kinematics, build_body
 from harness.core import rotations
+from harness.core.estimate import HALF_WIDTH_95
 from harness.report.kit.motion_player import NO_ESTIMATE, PlayerMotion
 from harness.report.run import player_data
 from harness.report.run.data import pose_pair, read_run
@@ -33,7 +34,7 @@ def motion_of(out: Path) -> tuple[PlayerMotion, str]:
 def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return planted_run(
         tmp_path_factory.mktemp("player") / "run",
-        Plan(duration_s=4.0, covered=0.8, components={"dropout": {"share": 0.1}}),
+        Plan(duration_s=4.0, covered=0.8, components={"dropout": {"share": 0.1}}, sigma_deg={"ik": 3.0}),
     )
 
 
@@ -62,6 +63,11 @@ def test_frames_without_an_estimate_are_marked_and_others_are_the_cells(run_fold
         np.testing.assert_array_equal(track.joints_m[answered], estimate.joints_m)
         assert clip.truth is not None
         np.testing.assert_array_equal(clip.truth.joints_m[answered], truth.joints_m)
+        assert (cell.angle_sigma_rad is None) == (track.region_deg is None) == (track.name != "ik")
+        if cell.angle_sigma_rad is not None and track.region_deg is not None:
+            stated_deg = np.rad2deg(HALF_WIDTH_95 * cell.angle_sigma_rad.mean(axis=1))
+            np.testing.assert_allclose(track.region_deg[answered], stated_deg, rtol=1e-6)
+            assert np.isfinite(track.region_deg).all()
 
 
 def test_stations_stand_where_mujoco_puts_them(run_folder: Path) -> None:
