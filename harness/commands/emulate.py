@@ -2,12 +2,13 @@
 
 import argparse
 import shlex
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from typing import TYPE_CHECKING
 
 from harness.commands.flags import (
     Verbs,
     add_verb,
+    add_vrpn_flag,
     output_link,
     parse_characters,
     parse_items,
@@ -23,21 +24,24 @@ from harness.commands.playback_flags import (
     parse_device_stations,
 )
 from harness.core.interrupts import defer_interrupts
+from harness.core.network import LOOPBACK
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
     from harness.experiment.scenarios import Scenario
     from harness.stream.is900 import EmulatorConfig
+    from harness.stream.is900.codec import DeviceSamples
 
 
 def add_emulate(verbs: Verbs) -> None:
-    text = "play a scenario as an IS-900 in real time, at a pseudo terminal or a TCP port, until Ctrl-C"
+    text = "play a scenario as an IS-900 in real time, at a pseudo terminal, a TCP port or a VRPN server, until Ctrl-C"
     verb = add_verb(verbs, "emulate", text, run_emulate, "seed", "mocap")
     verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
     where = verb.add_mutually_exclusive_group(required=True)
     text = "open a pseudo terminal, and link to it under this name"
     where.add_argument("--pty", type=output_link, metavar="LINK", help=text)
     where.add_argument("--tcp", metavar="HOST:PORT", help="listen at a TCP port; port 0 takes a free one")
+    add_vrpn_flag(where, "the stations of the emulated device, which the harness itself then uses")
     text = "also broadcast UDP packets from the start, as after MEthUdp1; without HOST, to this computer"
     verb.add_argument("--udp", metavar="[HOST:]PORT", help=text)
     text = "accept connections from other computers, or broadcast to them"
@@ -70,14 +74,16 @@ def add_emulate(verbs: Verbs) -> None:
 
 
 def run_emulate(args: argparse.Namespace) -> Outcome:
-    from harness.stream.is900 import LOOPBACK, open_port, parse_udp_address, play_samples
+    from harness.stream.is900 import open_port, parse_udp_address, play_samples
     from harness.stream.is900.codec import check_emulated_capacity, check_range, missing_items
 
     if args.pty and args.anywhere and not args.udp:
         raise BadInput("--anywhere with --pty.", "--anywhere is for --tcp and --udp: leave it out.")
     udp = None if args.udp is None else parse_udp_address(args.udp, args.anywhere)
-    if args.tcp and args.check_baud:
-        raise BadInput("--check-baud with --tcp.", "A TCP connection has no baud rate; --check-baud is for --pty.")
+    if args.check_baud and not args.pty:
+        raise BadInput("--check-baud without --pty.", "Other connections have no baud rate: leave it out.")
+    if args.vrpn and args.udp:
+        raise BadInput("--udp with --vrpn.", "Give --tcp or --pty for a device that also broadcasts.")
     stations = parse_device_stations(args.stations)
     options = PlaybackOptions(
         args.scenario, stations, args.clip, args.rate, args.seed, args.mocap, args.noise, args.poses
@@ -90,6 +96,8 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     check_range(args.items or (), playback.reach_m)
     if not (args.unpaced or tracker.overload):
         check_emulated_capacity(len(scenario.stations), tracker.rate_hz, items, config.baud, playback.reach_m)
+    if args.vrpn:
+        return _serve_vrpn(args, samples, config, items)
     with ExitStack() as opened:
         with defer_interrupts():
             port = open_port(args.pty, args.tcp, anywhere=args.anywhere, log=print_status)
@@ -107,6 +115,34 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
         if udp:
             print_status(f"broadcasts to udp://{udp[0]}:{udp[1]}")
         counts = play_samples(samples, config, port, udp[0] if udp else LOOPBACK)
+    return print_result(args, counts, *(f"{name:20} {value:.6g}" for name, value in counts.items()))
+
+
+def _serve_vrpn(
+    args: argparse.Namespace, samples: "DeviceSamples", config: "EmulatorConfig", items: tuple[int, ...]
+) -> Outcome:
+    """Use the emulated device as its driver does, and serve what it reports."""
+    from harness.stream import EventCounter
+    from harness.stream.is900 import DriverConfig, open_tracker, serve_emulator
+    from harness.stream.vrpn import RelayedStream, open_server
+
+    with ExitStack() as opened:
+        with defer_interrupts():
+            server = opened.enter_context(open_server(args.vrpn, anywhere=args.anywhere, log=print_status))
+        device = opened.enter_context(serve_emulator(samples, config, tcp=f"{LOOPBACK}:0"))
+        driver = DriverConfig(
+            items=items, stations=samples.stations, characters=config.station_characters(len(samples.stations))
+        )
+        events = EventCounter(lambda text: print_status(f"line: {text}"))
+        tracker = opened.enter_context(open_tracker(device.name, driver, on_event=events))
+        sensors = ", ".join(f"{sensor} {name}" for sensor, name in enumerate(tracker.stations))
+        print_status(f"VRPN: {server.names[0]} with the sensors {sensors} at {tracker.rate_hz:g} Hz; Ctrl-C ends it")
+        following = ["harness", "record", f"vrpn:{server.names[0]}", "take.rec"]
+        print_status(f"next, in another terminal: {shlex.join(following)}")
+        with suppress(KeyboardInterrupt):
+            for _ in RelayedStream(tracker, server, server.trackers[0], tracker.measured_unix_s):
+                pass
+        counts = {**tracker.counts, "reports": server.sent, "clients": server.clients}
     return print_result(args, counts, *(f"{name:20} {value:.6g}" for name, value in counts.items()))
 
 

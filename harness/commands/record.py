@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 from harness.commands.flags import (
     LINE_FLAGS,
+    VRPN_PREFIX,
     Verbs,
     add_line_flags,
     add_verb,
     is_whole_number,
-    line_options,
+    line_config,
     output_link,
     parse_device_names,
     parse_names,
     refuse_flags,
+    tracker_config,
 )
 from harness.commands.output import print_result, print_status, recording_note, show_progress
 from harness.commands.playback_flags import PlaybackOptions, open_playback
@@ -34,7 +36,9 @@ def add_record(verbs: Verbs) -> None:
     text = "record both directions of a device's line until Ctrl-C; appends to a recording in the same file"
     verb = add_verb(verbs, "record", text, run_record, "seed", "mocap")
     verb.add_argument(
-        "port", help="/dev/ttyUSB0, COM3, tcp://HOST:PORT, udp://HOST:PORT, or sim:SCENARIO for a simulated line"
+        "port",
+        help="/dev/ttyUSB0, COM3, tcp://HOST:PORT, udp://HOST:PORT, vrpn:TRACKER@HOST[:PORT], "
+        "or sim:SCENARIO for a simulated line",
     )
     verb.add_argument("file", type=Path, help="the recording to write")
     text = (
@@ -134,7 +138,6 @@ def _plan_note(args: argparse.Namespace) -> dict[str, str]:
 
 def _record_line(args: argparse.Namespace) -> Outcome:
     """Record a device that is set up here, that another program uses, or that is sent commands."""
-    from harness.stream.is900 import DriverConfig
     from harness.stream.recording import (
         RecordingWriter,
         check_commands,
@@ -151,23 +154,24 @@ def _record_line(args: argparse.Namespace) -> Outcome:
     if args.send is not None:
         advice = "--send sets nothing but what it names: leave it out."
         refuse_flags(args, ("stations", *settings), "with --send", advice)
-    if args.port.startswith("udp:"):
-        advice = "UDP carries no commands: name the serial line."
+    if args.port.startswith(("udp:", VRPN_PREFIX)):
+        advice = "This port carries no commands: name the serial line."
         refuse_flags(args, ("serve", "send"), f"with {args.port}", advice)
     if args.send is not None:
         check_commands(args.send, args.allow_writes)
-    stations = None if args.stations is None else tuple(parse_device_names(args.stations))
-    config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args, args.port))
+    stations = None if args.stations is None else parse_device_names(args.stations, args.port)
     source = "served" if args.serve is not None else "port" if args.send is None else "commands"
     note = {"source": source, "port": args.port, "harness": VERSION, **_plan_note(args)}
     options: dict[str, Any] = {"seconds": args.seconds, "log": print_status, "progress": show_progress}
     with RecordingWriter(args.file, note) as writer:
         if args.serve is not None:
+            config = line_config(args, args.port, stations)
             counts = serve_line(args.port, args.serve, config, writer, **options)
         elif args.send is not None:
+            config = line_config(args, args.port, stations)
             exchanges = record_commands(args.port, args.send, config, writer, **options)
         else:
-            line = record_port(args.port, config, writer, **options)
+            line = record_port(args.port, tracker_config(args, args.port, stations), writer, **options)
     if args.serve is not None:
         unread, lost = counts["unread"], counts["undelivered"]
         text = [f"{unread} bytes were not read by a program"] if unread else []

@@ -4,27 +4,44 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from contextlib import redirect_stdout
+from contextlib import ExitStack, redirect_stdout, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.flags import Verbs, add_verb, parse_methods, parse_names, repeat_flags
+from harness.commands.flags import (
+    Verbs,
+    add_verb,
+    add_vrpn_flag,
+    parse_methods,
+    parse_names,
+    refuse_flags,
+    repeat_flags,
+)
 from harness.commands.output import print_caveat, print_data, print_result, print_status
+from harness.core.interrupts import defer_interrupts
 from harness.core.number_format import format_fixed
 from harness.core.progress import ProgressBar
-from harness.errors import Outcome
+from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
     from harness.experiment import Evaluation, ObservedTake
     from harness.stream.recording import Recording, RecordingStream
+
+_POLL_S = 0.2
+"""Interval at which the wait for a client can be interrupted [s]."""
 
 
 def add_replay(verbs: Verbs) -> None:
     text = "play a recording into the decoder; with --methods, into methods, scored against the known motion"
     verb = add_verb(verbs, "replay", text, run_replay, "seed", "mocap")
     verb.add_argument("file", type=Path, help="recording written by `harness record`")
-    text = "max (default), step (one frame per Enter), or a factor of the recorded speed, such as 1 or 0.5"
-    verb.add_argument("--speed", default="max", metavar="SPEED", help=text)
+    text = (
+        "max (default), step (one frame per Enter), or a factor of the recorded speed, such as 1 (default with --vrpn) "
+        "or 0.5"
+    )
+    verb.add_argument("--speed", metavar="SPEED", help=text)
+    add_vrpn_flag(verb, "the recorded stations, from the first client on")
+    verb.add_argument("--anywhere", action="store_true", help="open --vrpn to other computers too")
     text = "print every station of every frame, as CSV or as JSON lines"
     verb.add_argument("--frames", action="store_true", help=text)
     text = "methods to score, named as in scenarios, such as ik,dynamic_map"
@@ -44,16 +61,45 @@ def add_replay(verbs: Verbs) -> None:
 def run_replay(args: argparse.Namespace) -> Outcome:
     from harness.stream.recording import RecordingStream, parse_speed, read_recording
 
-    speed, recording = parse_speed(args.speed), read_recording(args.file)
+    speed = parse_speed(args.speed or ("1" if args.vrpn else "max"))
+    if args.anywhere and args.vrpn is None:
+        raise BadInput("--anywhere without --vrpn.", "Name the tracker that is served: --vrpn NAME.")
+    recording = read_recording(args.file)
     if recording.answers and not recording.formats:
         return _print_answers(args, recording)
     stream = RecordingStream(recording, speed)
     for lost in stream.recording.damage:
         print(f"lost: {lost}", file=sys.stderr)
     scoring = ("methods", "scenario", "stations", "clip", "noise", "rate", "seed", "calibration")
+    if args.vrpn is not None:
+        refuse_flags(args, ("frames", *scoring), "with --vrpn", "It is for a replay that is not served: leave it out.")
+        return _serve_frames(args, stream)
     if any(getattr(args, name) is not None for name in scoring):
         return _score_methods(args, stream)
     return _print_frames(args, stream)
+
+
+def _serve_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
+    """Serve the frames to VRPN clients, from the first client on."""
+    from harness.stream import UnixTimeEstimator
+    from harness.stream.vrpn import RelayedStream, open_server
+
+    frames = 0
+    with ExitStack() as opened:
+        with defer_interrupts():
+            server = opened.enter_context(open_server(args.vrpn, anywhere=args.anywhere, log=print_status))
+        sensors = ", ".join(f"{sensor} {name}" for sensor, name in enumerate(stream.stations))
+        print_status(f"VRPN: {server.names[0]} with the sensors {sensors}; waits for a client, Ctrl-C ends it")
+        outcome = Outcome.INTERRUPTED
+        with suppress(KeyboardInterrupt):
+            while not server.wait_for_client(_POLL_S):
+                pass
+            times = UnixTimeEstimator(stream.wall_s)
+            for _ in RelayedStream(stream, server, server.trackers[0], times):
+                frames += 1
+            outcome = Outcome.PASS
+    counts = {"frames": frames, "reports": server.sent}
+    return print_result(args, counts, f"{frames} frames, {server.sent} reports served", outcome=outcome)
 
 
 def _print_answers(args: argparse.Namespace, recording: "Recording") -> Outcome:

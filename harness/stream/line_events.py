@@ -38,7 +38,15 @@ class LineEvent:
     text: str
 
 
-class LineObserver(Protocol):
+class EventObserver(Protocol):
+    """Interface of an observer of events on the line."""
+
+    def on_event(self, event: LineEvent) -> None:
+        """Take an event on the line."""
+        ...
+
+
+class LineObserver(EventObserver, Protocol):
     """Interface of an observer of the line: it sees all bytes and events in order. `RecordingWriter` is one."""
 
     def on_received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
@@ -53,10 +61,6 @@ class LineObserver(Protocol):
         """Take the format of the bytes that follow. It is called after each configuration, before the command `C`; the
         device's clock starts at zero there.
         """
-        ...
-
-    def on_event(self, event: LineEvent) -> None:
-        """Take an event on the line."""
         ...
 
 

@@ -13,6 +13,7 @@ from harness.stream.is900.codec.replies import DeviceError, ParsedReply, StatusR
 from harness.stream.is900.driver.config import DriverConfig, DriverTiming
 from harness.stream.is900.driver.transport import LineLost, Transport, open_transport
 from harness.stream.line_events import LineObserver
+from harness.stream.tracker import DriverClosed
 
 
 @dataclass(frozen=True)
@@ -35,10 +36,6 @@ _STOP_TIMEOUT_FACTOR = 10
 """Multiple of `quiet_s` for which a device may go on sending after `c`, because its buffers empty first."""
 
 ReplyType = TypeVar("ReplyType", bound=ParsedReply)
-
-
-class DriverClosed(Exception):
-    """Ends a wait when the driver is closed meanwhile."""
 
 
 class DeviceConnection:

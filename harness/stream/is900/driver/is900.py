@@ -19,7 +19,6 @@ from harness.stream.is900.driver.configurator import DeviceConfigurator
 from harness.stream.is900.driver.connection import (
     DetectedDevice,
     DeviceConnection,
-    DriverClosed,
     NoAnswer,
     candidate_baud_rates,
     detect_device,
@@ -31,6 +30,7 @@ from harness.stream.is900.driver.tracker import Tracker
 from harness.stream.is900.driver.transport import UDP_SCHEME, LineLost
 from harness.stream.is900.driver.watchdog import Diagnosis, Watchdog, diagnose_reply
 from harness.stream.line_events import LineEvent, LineEventKind, LineObserver
+from harness.stream.tracker import DriverClosed
 
 MAX_EMITTERS = 200
 """More emitters than any constellation has."""

@@ -13,14 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
+from harness.core.network import LOOPBACK, parse_address
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.stream.is900.codec.samples import DeviceSamples
 from harness.stream.is900.emulator.config import EmulatorConfig
 from harness.stream.is900.emulator.device_state import SentMessage
 from harness.stream.is900.emulator.emulator import Emulator
-from harness.stream.is900.emulator.tcp_port import LogCallback, Port, TcpPort, parse_address
-from harness.stream.is900.emulator.udp_broadcast import LOOPBACK, UdpBroadcast, UdpPort
+from harness.stream.is900.emulator.tcp_port import LogCallback, Port, TcpPort
+from harness.stream.is900.emulator.udp_broadcast import UdpBroadcast, UdpPort
 
 SentCallback = Callable[[SentMessage], None]
 MAX_WAIT_S = 1.0
