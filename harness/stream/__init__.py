@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from harness.stream.host_clock import HostClockEstimator
     from harness.stream.inputs import INPUT_COMBINATIONS, make_inputs
     from harness.stream.line_events import EventCounter, LineEvent
+    from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
     from harness.stream.station_counts import FRAME_COLUMNS, StationCounts, StreamSummary, format_csv_row, frame_rows
 else:
     __getattr__, __dir__ = lazy_names(__name__)
@@ -16,9 +17,12 @@ else:
 __all__ = [
     "FRAME_COLUMNS",
     "INPUT_COMBINATIONS",
+    "BodyPoses",
     "EventCounter",
+    "FileFinding",
     "HostClockEstimator",
     "LineEvent",
+    "PoseLog",
     "StationCounts",
     "StreamSummary",
     "TrackerFrame",
