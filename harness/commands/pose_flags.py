@@ -33,13 +33,13 @@ def add_pose_flags(verb: argparse.ArgumentParser, *, shared: Sequence[str] = ())
         poses.add_argument("--rate", metavar="HZ", type=float, help="samples per second of a file without times")
 
 
-def pose_options(args: argparse.Namespace) -> "PoseFileOptions":
-    """What the flags say. Raises BadInput."""
+def pose_options(args: argparse.Namespace, *, untimed: bool = False) -> "PoseFileOptions":
+    """What the flags say; `untimed` reads files without times and rate all the same. Raises BadInput."""
     from harness.stream import PoseFileOptions
 
     columns = split_list(args.columns)
     return PoseFileOptions(
-        tuple(columns) if columns else None, args.unit, args.quaternion, args.up, args.time_unit, args.rate
+        tuple(columns) if columns else None, args.unit, args.quaternion, args.up, args.time_unit, args.rate, untimed
     )
 
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from harness.stream.inputs import INPUT_COMBINATIONS, make_inputs
     from harness.stream.line_events import EventCounter, LineEvent
     from harness.stream.poses.options import QUATERNION_ORDERS, UP_AXES, PoseFileOptions
-    from harness.stream.poses.pose_file import UnknownRate
+    from harness.stream.poses.pose_file import UNTIMED, UnknownRate
     from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
     from harness.stream.poses.pose_statistics import measure_sampling
     from harness.stream.station_counts import FRAME_COLUMNS, StationCounts, StreamSummary, format_csv_row, frame_rows
@@ -21,6 +21,7 @@ __all__ = [
     "FRAME_COLUMNS",
     "INPUT_COMBINATIONS",
     "QUATERNION_ORDERS",
+    "UNTIMED",
     "UP_AXES",
     "BodyPoses",
     "EventCounter",

@@ -28,6 +28,7 @@ _HEAD_CHARACTERS = MEGABYTE
 _PIECE_CHARACTERS = 4 * MEGABYTE
 _LONGEST_LINE = 8 * MEGABYTE
 _MOST_NAMES = 1000
+UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _COMMENT = re.compile(r"\s*(#|%|//)+")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,9})?")
 _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
@@ -80,8 +81,8 @@ class NumberTable:
 
 def read_head(path: Path) -> TableHead:
     """Conclude the form of a table from its beginning. Raises BadFile for a file without rows of numbers."""
-    data = _read_beginning(path)
-    if kind := file_kind(path):
+    data, utf16 = _read_beginning(path)
+    if not utf16 and (kind := file_kind(path)):
         raise wrong_file(path, kind, EXPECTED_FILE, "Check the path.")
     lines = data.split("\n")
     if len(data) == _HEAD_CHARACTERS:
@@ -110,19 +111,21 @@ def read_head(path: Path) -> TableHead:
     return TableHead(path, separator, decimal, tuple(header), first_line, columns, texts, np.array(rows))
 
 
-def _read_beginning(path: Path) -> str:
+def _read_beginning(path: Path) -> tuple[str, bool]:
+    """The beginning of a file, and whether it is UTF-16. Raises BadFile for an empty or binary one."""
     with _open_text(path) as file:
         text = file.read(_HEAD_CHARACTERS)
+        utf16 = file.encoding == "utf-16"
     if "\0" in text or not text.strip():
         found = "binary data" if "\0" in text else "an empty file"
         raise wrong_file(path, found, EXPECTED_FILE, "Is it the right file?")
-    return text
+    return text, utf16
 
 
 def _open_text(path: Path) -> io.TextIOWrapper:
     """A file as text with line ends of one kind; UTF-16 where its first bytes say so. Raises BadFile."""
     file = open_input_file(path, EXPECTED_FILE, MAX_BYTES)
-    utf16 = file.read(2) in (b"\xff\xfe", b"\xfe\xff")
+    utf16 = file.read(2) in UTF16_MARKS
     file.seek(0)
     return io.TextIOWrapper(file, "utf-16" if utf16 else "utf-8-sig", errors="replace")
 
@@ -174,8 +177,11 @@ def read_rows(head: TableHead, columns: Sequence[int], name_column: int | None =
     """Read the rows of some columns, and of one that holds the name of a body. Raises BadFile with the line."""
     reader = _RowReader(head, columns, name_column)
     parts = [reader.read(*piece) for piece in _pieces(head)]
-    numbers = np.concatenate([part for part, _ in parts])
     name_of = np.concatenate([codes for _, codes in parts])
+    numbers, begin = np.empty((len(name_of), len(columns))), 0
+    while parts:  # each is released once it is copied
+        part, _ = parts.pop(0)
+        numbers[begin : (begin := begin + len(part))] = part
     left_out = tuple(f"{count} {what}" for what, count in reader.left_out.items())
     cleaned = [unescape_formula(word.strip(' \t"')) for word in reader.names]
     names = tuple(dict.fromkeys(cleaned))

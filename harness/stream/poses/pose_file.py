@@ -3,6 +3,7 @@
 Everything that the file does not say is concluded from its numbers, or assumed, and stands in the findings of the log.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from harness.stream.poses.evidence import (
     conclude_length_unit,
     conclude_quaternion_order,
     conclude_time_unit,
+    counts_samples,
 )
 from harness.stream.poses.matrices import holds_matrices, split_matrices
 from harness.stream.poses.number_table import EXPECTED_FILE, TableHead, read_head, read_rows
@@ -35,8 +37,11 @@ _UP_TO_Z = {
     "-x": (0.5**0.5, 0.0, 0.5**0.5, 0.0),
 }
 """Axis that points up -> quaternion that turns it to z."""
-_LOST_M = 0.05
-"""Distance from poses before and after at which positions of exactly (0, 0, 0) count as not seen [m] [choice]."""
+_LOST_SHARE = 0.05
+"""Distance from (0, 0, 0) of the poses before and after, in median distances, from which on positions that are exactly
+there count as not seen [choice]."""
+UNTIMED = "numbers of samples"
+"""Clock of a log whose source has no times, where no rate was given either."""
 
 
 class UnknownRate(BadInput):
@@ -116,7 +121,7 @@ def _read_file(path: Path, options: PoseFileOptions) -> PoseLog:
         raw = [
             _RawPoses(n, times, poses[:, c : c + 3], poses[:, c + 3 : c + 7]) for n, c in zip(names, width, strict=True)
         ]
-    del table, poses
+    del table, times, poses, counted
     return _finish(head, options, columns, raw, findings, counted=columns.time is None)
 
 
@@ -137,12 +142,16 @@ def _read_matrices(head: TableHead, options: PoseFileOptions) -> PoseLog:
 def _body_names(path: Path, columns: TableColumns, words: tuple[str, ...]) -> list[str]:
     """Names of the bodies, each another."""
     if columns.body is not None:
-        return [word or path.stem for word in words]
+        return [f"{float(word):g}" if _is_number(word) else word or path.stem for word in words]
     names = [body.name for body in columns.bodies]
     if names == [""]:
         return [path.stem]
     numbered = [name or f"body{n}" for n, name in enumerate(names, 1)]
     return [name if numbered.count(name) == 1 else f"{name}_{n}" for n, name in enumerate(numbered, 1)]
+
+
+def _is_number(word: str) -> bool:
+    return bool(re.fullmatch(r"\d+\.?\d*", word))
 
 
 def _finish(
@@ -160,23 +169,24 @@ def _finish(
         names = ", ".join(one.name for one in raw[:12])
         findings.append(FileFinding("bodies", f"{len(raw)}: {names}", "the columns' or rows' names"))
     scale_s, clock = _conclude_clock(path, options, columns, raw, findings, counted=counted)
-    raw = [replace(one, times_s=one.times_s * scale_s) for one in raw]
-    raw = [_seen_rows(path, one, findings) for one in raw]
+    for n, one in enumerate(raw):  # one after another, for memory
+        raw[n] = _in_order(_seen_rows(path, replace(one, times_s=one.times_s * scale_s), findings), findings)
     raw = [one for one in raw if len(one.times_s)]
     if not raw:
         raise BadFile(path, "no row with a time and a pose", EXPECTED_FILE, "Is it the right file?")
-    raw = [_in_order(one, findings) for one in raw]
     largest = max(raw, key=lambda one: len(one.times_s))
-    order = _conclude_order(options, columns, largest, findings)
+    order = _conclude_order(options, columns, largest, findings, usual="wxyz" if scale_s == 1e-9 else "xyzw")
     unit, unit_m = conclude_length_unit(
-        largest.positions, None if counted else largest.times_s, columns.length_unit, options.unit_m
+        largest.positions, None if clock == UNTIMED else largest.times_s, columns.length_unit, options.unit_m
     )
     findings.append(unit)
     turn = _conclude_up(options, columns, findings)
     start_s = min(float(one.times_s[0]) for one in raw)
-    bodies = tuple(_to_body(one, order, unit_m, turn, start_s) for one in raw)
+    bodies = []
+    while raw:
+        bodies.append(_to_body(raw.pop(0), order, unit_m, turn, start_s))
     unix = clock == "Unix time"
-    return PoseLog(bodies, path.name, tuple(findings), clock, start_s if unix else None)
+    return PoseLog(tuple(bodies), path.name, tuple(findings), clock, start_s if unix else None)
 
 
 def _conclude_clock(
@@ -189,11 +199,21 @@ def _conclude_clock(
     counted: bool,
 ) -> tuple[float, str]:
     """Seconds of 1 in the column of times, and what they count. UnknownRate without either."""
+    times = np.unique(np.concatenate([one.times_s for one in raw]))
+    times = times[np.isfinite(times)]
+    if not len(times):
+        raise BadFile(path, "no time that is a number", EXPECTED_FILE, "Is it the right file?")
+    numbered = columns.frame is not None
+    if not counted and not columns.time_unit and options.time_unit is None and counts_samples(times):
+        counted = numbered = True
     if counted:
-        what = "numbers of samples" if columns.frame is not None else "no times"
+        what = "no times, but numbers of samples" if numbered else "no times"
         rate_hz = options.rate_hz or columns.rate_hz
         if options.time_unit is not None:
-            raise BadInput(f"--time-unit for {path.name}, which has {what}.", "Give --rate HZ instead.")
+            raise BadInput(f"--time-unit, but {path.name} has {what}.", "Give --rate HZ instead.")
+        if rate_hz is None and options.untimed:
+            findings.append(FileFinding("time", "none: give the samples per second with --rate HZ", f"it has {what}"))
+            return 1.0, UNTIMED
         if rate_hz is None:
             rows = sum(len(one.times_s) for one in raw)
             raise UnknownRate(f"{path.name} has {what} ({count_noun(rows, 'sample')}).")
@@ -202,10 +222,6 @@ def _conclude_clock(
         return 1.0 / rate_hz, f"samples counted at {rate_hz:g} Hz"
     if options.rate_hz is not None:
         raise BadInput(f"{path.name} has times of its own.", "Leave out --rate.")
-    times = np.unique(np.concatenate([one.times_s for one in raw]))
-    times = times[np.isfinite(times)]
-    if not len(times):
-        raise BadFile(path, "no time that is a number", EXPECTED_FILE, "Is it the right file?")
     unit = conclude_time_unit(times, columns.time_unit, options.time_unit)
     findings.append(unit)
     scale_s = TIME_UNITS_S[unit.value]
@@ -231,7 +247,7 @@ def _seen_rows(path: Path, raw: _RawPoses, findings: list[FileFinding]) -> _RawP
         present &= ~_lost_at_origin(raw.positions, present, zero)
     lost = int(len(present) - np.count_nonzero(present))
     if lost:
-        reason = "empty cells, quaternions of 0, or positions that jump to exactly (0, 0, 0)"
+        reason = "empty cells, a row that was cut off, quaternions of 0, or positions that jump to (0, 0, 0)"
         findings.append(FileFinding(f"gaps of {raw.name}", f"{lost} of {len(present)} rows hold no pose", reason))
     rows = np.flatnonzero(present)
     return _RawPoses(raw.name, raw.times_s[rows], raw.positions[rows], raw.quaternions[rows] / norm[rows, None])
@@ -245,7 +261,7 @@ def _lost_at_origin(positions: Floats, present: Bools, zero: Bools) -> Bools:
     at = np.flatnonzero(zero)
     after = np.searchsorted(rows, at).clip(max=len(rows) - 1)
     before = (np.searchsorted(rows, at) - 1).clip(min=0)
-    near = np.minimum(size[before], size[after]) < _LOST_M * scale
+    near = np.minimum(size[before], size[after]) < _LOST_SHARE * scale
     out: Bools = np.zeros_like(zero)
     out[at[~near]] = True
     return out
@@ -273,12 +289,11 @@ def _in_order(raw: _RawPoses, findings: list[FileFinding]) -> _RawPoses:
 
 
 def _conclude_order(
-    options: PoseFileOptions, columns: TableColumns, raw: _RawPoses, findings: list[FileFinding]
+    options: PoseFileOptions, columns: TableColumns, raw: _RawPoses, findings: list[FileFinding], usual: str
 ) -> list[int]:
-    """Places of w, x, y, z in the file's quaternions."""
+    """Places of w, x, y, z in the file's quaternions; `usual` is EuRoC's order for times in ns."""
     if columns.order and not columns.order_reason:
         return [0, 1, 2, 3]  # matrices
-    euroc = raw.times_s[0] * 1e9 > 1e15 and columns.time_unit == "ns"
     finding = conclude_quaternion_order(
         raw.positions,
         raw.quaternions,
@@ -286,7 +301,7 @@ def _conclude_order(
         stated=columns.order,
         reason=columns.order_reason,
         given=options.quaternion,
-        usual="wxyz" if euroc else "xyzw",
+        usual=usual,
     )
     findings.append(finding)
     return [finding.value.index(axis) for axis in "wxyz"]

@@ -21,6 +21,7 @@ from harness.core.file_kind import POSES_KIND, file_kind
 from harness.core.files import atomic_path, require_writable
 from harness.core.input_file import open_input_file, read_input_file
 from harness.errors import BadFile, BadInput, HarnessError
+from harness.stream.poses.number_table import UTF16_MARKS
 from harness.stream.poses.options import PoseFileOptions
 from harness.stream.poses.pose_file import read_pose_log
 from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
@@ -68,7 +69,7 @@ class PoseRecording:
 def open_poses(paths: Sequence[Path], options: PoseFileOptions | None = None) -> PoseRecording:
     """Read a recording of poses, or files of another program (`read_pose_log`). Raises BadFile as these do."""
     if len(paths) == 1 and is_pose_recording(paths[0]):
-        if options not in (None, PoseFileOptions()):
+        if options is not None and replace(options, untimed=False) != PoseFileOptions():
             advice = "Units, columns and axes were settled when it was made: leave such options out."
             raise BadInput(f"{paths[0].name} is a recording of poses.", advice)
         return read_pose_recording(paths[0])
@@ -83,12 +84,14 @@ def is_pose_recording(path: Path) -> bool:
 
 def is_pose_file(path: Path) -> bool:
     """Whether a file is a recording of poses, or a text of no other kind; False for what is no file."""
-    kind = file_kind(path)
-    if kind or not path.is_file():
-        return kind == POSES_KIND
+    if not path.is_file():
+        return False
     with open_input_file(path, EXPECTED_POSES, MAX_BYTES) as file:
         data = file.read(_TEXT_BYTES)
-    return b"\0" not in data.removeprefix(b"\xff\xfe") and BLOCK_MARKER not in data
+    if data.startswith(UTF16_MARKS):
+        return True
+    kind = file_kind(path)
+    return kind == POSES_KIND or (not kind and b"\0" not in data and BLOCK_MARKER not in data)
 
 
 def write_pose_recording(
