@@ -192,8 +192,8 @@ def _pair(places: Sequence[_Group], turns: Sequence[_Group]) -> tuple[BodyColumn
 def _missing(
     path: Path, names: Sequence[ColumnName], paths: Sequence[Sequence[str]], has_place: bool, has_turn: bool
 ) -> BadFile:
-    angles = [p[-1] for name, p in zip(names, paths, strict=True) if name.kind == "angle" or name.axis in AXES]
-    if has_place and not has_turn and angles and any(name.kind == "angle" for name in names):
+    angles = [p[-1] for name, p in zip(names, paths, strict=True) if name.kind == "angle" or name.family == "r"]
+    if has_place and not has_turn and angles:
         found = f"angles ({', '.join(angles[:6])}) of a convention that the file does not name"
         return BadFile(path, found, "quaternions or matrices", "Export quaternions.")
     lacks = "position" if not has_place else "quaternion" if not has_turn else "body with both of them"

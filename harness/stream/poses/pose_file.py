@@ -40,6 +40,8 @@ _UP_TO_Z = {
 _LOST_SHARE = 0.05
 """Distance from (0, 0, 0) of the poses before and after, in median distances, from which on positions that are exactly
 there count as not seen [choice]."""
+_CUT_NORMS, _EXACT_NORM = 3.0, 1e-8
+"""Deviations of a norm from 1 that show a row to be cut: in those of the other rows, and above that of exact ones."""
 UNTIMED = "numbers of samples"
 """Clock of a log whose source has no times, where no rate was given either."""
 
@@ -121,8 +123,9 @@ def _read_file(path: Path, options: PoseFileOptions) -> PoseLog:
         raw = [
             _RawPoses(n, times, poses[:, c : c + 3], poses[:, c + 3 : c + 7]) for n, c in zip(names, width, strict=True)
         ]
+    ends_whole = table.ends_whole
     del table, times, poses, counted
-    return _finish(head, options, columns, raw, findings, counted=columns.time is None)
+    return _finish(head, options, columns, raw, findings, counted=columns.time is None, cut=not ends_whole)
 
 
 def _read_matrices(head: TableHead, options: PoseFileOptions) -> PoseLog:
@@ -136,7 +139,7 @@ def _read_matrices(head: TableHead, options: PoseFileOptions) -> PoseLog:
     raw = [_RawPoses(head.path.stem, counted if times is None else times, positions, quaternions)]
     body = BodyColumns("", (0, 1, 2), (3, 4, 5, 6))
     columns = TableColumns((body,), None if times is None else 0, None, None, order="wxyz", order_reason="")
-    return _finish(head, options, columns, raw, findings, counted=times is None)
+    return _finish(head, options, columns, raw, findings, counted=times is None, cut=False)
 
 
 def _body_names(path: Path, columns: TableColumns, words: tuple[str, ...]) -> list[str]:
@@ -162,6 +165,7 @@ def _finish(
     findings: list[FileFinding],
     *,
     counted: bool,
+    cut: bool,
 ) -> PoseLog:
     """Units, order, frame and clock; rows without a pose and doubled ones are left out."""
     path = head.path
@@ -170,7 +174,7 @@ def _finish(
         findings.append(FileFinding("bodies", f"{len(raw)}: {names}", "the columns' or rows' names"))
     scale_s, clock = _conclude_clock(path, options, columns, raw, findings, counted=counted)
     for n, one in enumerate(raw):  # one after another, for memory
-        raw[n] = _in_order(_seen_rows(path, replace(one, times_s=one.times_s * scale_s), findings), findings)
+        raw[n] = _in_order(_seen_rows(path, replace(one, times_s=one.times_s * scale_s), findings, cut=cut), findings)
     raw = [one for one in raw if len(one.times_s)]
     if not raw:
         raise BadFile(path, "no row with a time and a pose", EXPECTED_FILE, "Is it the right file?")
@@ -231,15 +235,19 @@ def _conclude_clock(
     return scale_s, "Unix time" if unix else "seconds from an unknown start"
 
 
-def _seen_rows(path: Path, raw: _RawPoses, findings: list[FileFinding]) -> _RawPoses:
-    """The rows that hold a pose. BadFile for quaternions of another norm than 1."""
+def _seen_rows(path: Path, raw: _RawPoses, findings: list[FileFinding], *, cut: bool) -> _RawPoses:
+    """The rows that hold a pose. BadFile for quaternions of another norm than 1.
+
+    With `cut` the file ends without a line end: a last row with the worst norm has lost digits.
+    """
     with np.errstate(over="ignore", invalid="ignore"):
         norm = np.sqrt(np.sum(raw.quaternions**2, axis=1))
     present = np.isfinite(raw.times_s) & np.isfinite(raw.positions).all(axis=1) & np.isfinite(norm) & (norm > 0.0)
-    wrong = np.flatnonzero(present & (np.abs(norm - 1.0) > NORM_TOLERANCE))
-    if len(wrong) == 1 and wrong[0] == len(norm) - 1 and len(norm) > 1:  # the last row was cut off
-        present[wrong] = False
-    elif len(wrong):
+    deviation = np.where(present, np.abs(norm - 1.0), 0.0)
+    if cut and len(norm) > 1 and deviation[-1] > _CUT_NORMS * deviation[:-1].max() + _EXACT_NORM:
+        present[-1] = False
+    wrong = np.flatnonzero(present & (deviation > NORM_TOLERANCE))
+    if len(wrong):
         found = f"a quaternion of norm {norm[wrong[0]]:.3g} in row {wrong[0] + 1} of {raw.name}"
         raise BadFile(path, found, "unit quaternions", "Name the columns with --columns, or remove damaged rows.")
     zero = present & ~raw.positions.any(axis=1)
