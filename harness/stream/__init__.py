@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from harness.stream.inputs import INPUT_COMBINATIONS, make_inputs
     from harness.stream.line_events import EventCounter, LineEvent
     from harness.stream.ports import TrackerConfig, open_tracker_at
+    from harness.stream.poses.options import QUATERNION_ORDERS, UP_AXES, PoseFileOptions
+    from harness.stream.poses.pose_file import UNTIMED, UnknownRate
+    from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
+    from harness.stream.poses.pose_statistics import measure_sampling
     from harness.stream.station_counts import FRAME_COLUMNS, StationCounts, StreamSummary, format_csv_row, frame_rows
     from harness.stream.tracker import OpenTracker
 else:
@@ -18,19 +22,28 @@ else:
 __all__ = [
     "FRAME_COLUMNS",
     "INPUT_COMBINATIONS",
+    "QUATERNION_ORDERS",
+    "UNTIMED",
+    "UP_AXES",
+    "BodyPoses",
     "EventCounter",
+    "FileFinding",
     "HostClockEstimator",
     "LineEvent",
     "OpenTracker",
+    "PoseFileOptions",
+    "PoseLog",
     "StationCounts",
     "StreamSummary",
     "TrackerConfig",
     "TrackerFrame",
     "TrackerStream",
     "UnixTimeEstimator",
+    "UnknownRate",
     "format_csv_row",
     "frame_rows",
     "make_inputs",
+    "measure_sampling",
     "open_tracker_at",
     "split_frames",
 ]
