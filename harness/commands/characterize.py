@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from harness.commands.flags import (
     LINE_FLAGS,
-    VRPN_PREFIX,
     Verbs,
     add_line_flags,
     add_verb,
@@ -18,6 +17,7 @@ from harness.commands.flags import (
 )
 from harness.commands.output import print_result, print_status, recording_note, show_progress, this_command
 from harness.commands.unit_results import UnitOptions, add_unit_flags, departure_content, read_expected, write_unit
+from harness.core.network import VRPN_PREFIX
 from harness.core.package_data import VERSION
 from harness.core.progress import ProgressBar
 from harness.errors import BadFile, BadInput, Outcome

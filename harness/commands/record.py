@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from harness.commands.flags import (
     LINE_FLAGS,
-    VRPN_PREFIX,
     Verbs,
     add_line_flags,
     add_verb,
@@ -23,6 +22,7 @@ from harness.commands.flags import (
 from harness.commands.output import print_result, print_status, recording_note, show_progress
 from harness.commands.playback_flags import PlaybackOptions, open_playback
 from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
+from harness.core.network import VRPN_PREFIX
 from harness.core.package_data import VERSION
 from harness.errors import BadInput, Outcome
 
@@ -198,6 +198,7 @@ def _record_line(args: argparse.Namespace) -> Outcome:
         RecordingWriter,
         check_commands,
         format_exchanges,
+        open_writer,
         record_commands,
         record_port,
         serve_line,
@@ -219,6 +220,11 @@ def _record_line(args: argparse.Namespace) -> Outcome:
     source = "served" if args.serve is not None else "port" if args.send is None else "commands"
     note = {"source": source, "port": args.port, "harness": VERSION, **_plan_note(args)}
     options: dict[str, Any] = {"seconds": args.seconds, "log": print_status, "progress": show_progress}
+    if args.port.startswith(VRPN_PREFIX):
+        tracker = tracker_config(args, args.port, stations)
+        with open_writer(args.file, note, tracker) as writer:
+            line = record_port(args.port, tracker, writer, **options)
+        return _print_poses(args, writer, line)
     with RecordingWriter(args.file, note) as writer:
         if args.serve is not None:
             config = line_config(args, args.port, stations)
@@ -227,7 +233,7 @@ def _record_line(args: argparse.Namespace) -> Outcome:
             config = line_config(args, args.port, stations)
             exchanges = record_commands(args.port, args.send, config, writer, **options)
         else:
-            line = record_port(args.port, tracker_config(args, args.port, stations), writer, **options)
+            line = record_port(args.port, line_config(args, args.port, stations), writer, **options)
     if args.serve is not None:
         unread, lost = counts["unread"], counts["undelivered"]
         text = [f"{unread} bytes were not read by a program"] if unread else []
@@ -236,6 +242,22 @@ def _record_line(args: argparse.Namespace) -> Outcome:
     if args.send is not None:
         return _print_recording(args, writer, more={"exchanges": exchanges}, lines=format_exchanges(exchanges))
     return _print_recording(args, writer, line)
+
+
+def _print_poses(args: argparse.Namespace, writer: "RecordingWriter", line: Mapping[str, int]) -> Outcome:
+    """Print what was recorded of a tracker that reports poses; `line` are the counts of its client."""
+    poses, outcome = writer.counts["pose"], Outcome.PASS
+    line = {**line, "left_out": writer.counts["left_out"]}
+    content = {"file": str(args.file), "poses": poses, "events": writer.counts["evnt"], **line}
+    text = f"{args.file}: {poses:,} poses"
+    if writer.empty:
+        text = f"{args.file}: stopped before a pose was recorded into it"
+        outcome = Outcome.INTERRUPTED if line.get("interrupted") else Outcome.NOT_COMPARABLE
+    counted = {"reconnects": "reconnects", "copies": "redundant reports", "clock_resets": "resets of its clock"}
+    counted["left_out"] = "poses left out that were not later than the one before"
+    text += "".join(f", {line[name]} {words}" for name, words in counted.items() if line.get(name))
+    following = ["inspect", args.file] if args.file.exists() else []
+    return print_result(args, content, text, outcome=outcome, following=following)
 
 
 def _print_recording(

@@ -6,6 +6,8 @@ from typing import Any
 from harness.errors import BadInput
 
 LOOPBACK = "127.0.0.1"
+VRPN_PREFIX = "vrpn:"
+"""Beginning of a port that is a tracker of a VRPN server."""
 _LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 

@@ -3,10 +3,11 @@ it.
 """
 
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal, Protocol
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Protocol, runtime_checkable
 
+from harness.stream.frame import TrackerFrame
 from harness.stream.is900.codec.reader import WireFormat
 
 LineEventKind = Literal[
@@ -61,6 +62,34 @@ class LineObserver(EventObserver, Protocol):
         """Take the format of the bytes that follow. It is called after each configuration, before the command `C`; the
         device's clock starts at zero there.
         """
+        ...
+
+
+@dataclass(frozen=True)
+class TrackedBodies:
+    """What the poses of a tracker that reports no bytes are of."""
+
+    names: tuple[str, ...]
+    """Station names, in the order of the rows of a frame."""
+    source: str
+    clock: str
+    """What `measured_s` counts, in words."""
+    start_unix_s: float
+    """Unix time of the zero of `measured_s` [s]."""
+    assumed: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """What the tracker does not tell: the value that is assumed, and why, by subject."""
+
+
+@runtime_checkable
+class PoseObserver(EventObserver, Protocol):
+    """Interface of an observer of a tracker that reports poses. `PoseRecordingWriter` is one."""
+
+    def on_bodies(self, bodies: TrackedBodies) -> None:
+        """Take what the frames that follow are of; called once, before the first frame."""
+        ...
+
+    def on_frame(self, frame: TrackerFrame) -> None:
+        """Take a frame."""
         ...
 
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         write_pose_recording,
     )
     from harness.stream.recording.pose_replay import PoseLogStream
+    from harness.stream.recording.pose_writer import open_writer
     from harness.stream.recording.recorder import RecordingSwitch, record_port
     from harness.stream.recording.recording import (
         EXPECTED_FILE,
@@ -64,6 +65,7 @@ __all__ = [
     "format_exchanges",
     "is_pose_file",
     "open_poses",
+    "open_writer",
     "parse_speed",
     "read_blocks",
     "read_recording",

@@ -19,9 +19,10 @@ from harness.core.arrays import Floats
 from harness.errors import BadFile
 from harness.stream.frame import TrackerFrame
 from harness.stream.line_events import EventCounter
-from harness.stream.ports import TrackerConfig, open_tracker_at
+from harness.stream.ports import TrackerConfig, open_tracker
+from harness.stream.recording.pose_writer import open_writer, read_stretch_marks
 from harness.stream.recording.recorder import tracked_text
-from harness.stream.recording.recording import RecordingWriter, read_marks
+from harness.stream.recording.recording import RecordingWriter
 from harness.stream.tracker import OpenTracker
 
 WATCHED_S = 2.0
@@ -51,7 +52,7 @@ def finished_stretches(path: Path) -> set[str]:
         return set()
     return {
         str(begin["stretch"])
-        for begin, end in pairwise(read_marks(path))
+        for begin, end in pairwise(read_stretch_marks(path))
         if begin.get("stretch") and end.get("stretch") == "" and end.get("finished") == begin["stretch"]
     }
 
@@ -82,8 +83,8 @@ def capture_stretches(
         return
     events = EventCounter(log)
     with (
-        RecordingWriter(path, note) as writer,
-        open_tracker_at(port, config, observer=writer, on_event=events) as device,
+        open_writer(path, note, config) as writer,
+        open_tracker(port, config, observer=writer, on_event=events) as device,
         closing(_frames(device, path)) as frames,
     ):
         log(f"{device.identification or 'a device'} at {port}; stations {device.station_list}")

@@ -42,8 +42,9 @@ from harness.stream.recording.blocks import (
 from harness.stream.recording.recording import MAX_BYTES, PLAN_FILE, Recording, describe_damage
 
 EXPECTED_POSES = "a recording of poses by `harness record`"
-_ROW = np.dtype([("body", "<u4"), ("time_s", "<f8"), ("position_m", "<f8", 3), ("quaternion", "<f8", 4)])
-_ROWS_PER_BLOCK = MAX_PAYLOAD_BYTES // _ROW.itemsize
+POSE_ROW = np.dtype([("body", "<u4"), ("time_s", "<f8"), ("position_m", "<f8", 3), ("quaternion", "<f8", 4)])
+"""A row of a block of poses."""
+_ROWS_PER_BLOCK = MAX_PAYLOAD_BYTES // POSE_ROW.itemsize
 _TEXT_BYTES = 4096
 
 
@@ -137,7 +138,7 @@ def _encode(log: PoseLog, note: Mapping[str, Any], marks: Sequence[tuple[float, 
 
 def _rows(log: PoseLog) -> NDArray[Any]:
     """All poses as rows in the order of time."""
-    rows = np.empty(sum(len(body.times_s) for body in log.bodies), dtype=_ROW)
+    rows = np.empty(sum(len(body.times_s) for body in log.bodies), dtype=POSE_ROW)
     begin = 0
     for number, body in enumerate(log.bodies):
         part = rows[begin : (begin := begin + len(body.times_s))]
@@ -161,14 +162,14 @@ def read_pose_recording(path: Path) -> PoseRecording:
         elif block.kind == MARK:
             marks.append((block.monotonic_s, str(parser.parse_json(block).get("stretch", ""))))
         elif block.kind == POSES:
-            if len(block.payload) % _ROW.itemsize:
+            if len(block.payload) % POSE_ROW.itemsize:
                 raise BadFile(path, "a block of poses that ends within a row", EXPECTED_POSES, "Record again.")
-            parts.append(np.frombuffer(block.payload, dtype=_ROW))
+            parts.append(np.frombuffer(block.payload, dtype=POSE_ROW))
     try:
         names = [str(name) for name in head["bodies"]]
         findings = tuple(build(FileFinding, finding, "finding") for finding in head["findings"])
         start, source, clock = head["start_unix_s"], str(head["source"]), str(head["clock"])
-        rows = np.concatenate(parts) if parts else np.empty(0, dtype=_ROW)
+        rows = np.concatenate(parts) if parts else np.empty(0, dtype=POSE_ROW)
         bodies = [_body(name, rows[rows["body"] == number]) for number, name in enumerate(names)]
         first_s = min((float(body.times_s[0]) for body in bodies if body is not None), default=0.0)
         if first_s:  # the first block is damaged

@@ -6,11 +6,10 @@ from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
     from harness.stream.vrpn.client import VrpnConfig, VrpnTracker
-    from harness.stream.vrpn.connection import PREFIX
     from harness.stream.vrpn.messages import PoseReport
     from harness.stream.vrpn.relay import RelayedStream
     from harness.stream.vrpn.server import VrpnServer, open_server
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
-__all__ = ["PREFIX", "PoseReport", "RelayedStream", "VrpnConfig", "VrpnServer", "VrpnTracker", "open_server"]
+__all__ = ["PoseReport", "RelayedStream", "VrpnConfig", "VrpnServer", "VrpnTracker", "open_server"]

@@ -2,13 +2,13 @@
 
 import threading
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from harness.core.arrays import Floats
 from harness.errors import BadInput, shorten
 from harness.stream.frame import TrackerFrame
-from harness.stream.line_events import EventObserver, LineEvent, LineEventKind
+from harness.stream.line_events import EventObserver, LineEvent, LineEventKind, PoseObserver, TrackedBodies
 from harness.stream.tracker import DriverClosed, OpenTracker
 from harness.stream.vrpn.connection import ConnectionLost, ServerConnection, TrackerAddress
 from harness.stream.vrpn.messages import MalformedMessage, PoseReport
@@ -74,10 +74,13 @@ class VrpnTracker(OpenTracker):
         on_report: PoseCallback = lambda report, now_s: None,
         timing: VrpnTiming | None = None,
     ) -> None:
+        """Open the tracker. `observer` receives the events, and the frames too if it is a `PoseObserver`."""
         super().__init__(port, observer=observer, on_event=on_event)
+        self._pose_observer = observer if isinstance(observer, PoseObserver) else None
         self.config, self._timing, self._on_report = config or VrpnConfig(), timing or VrpnTiming(), on_report
         self._address = TrackerAddress.parse(port)
         self._lock, self._reconnects, self._trouble = threading.RLock(), 0, ""
+        self._frames_begun = False
         self._seen_s, self._pinged = self._monotonic_s(), False
         self._line: ServerConnection | None = None
         self._strange: set[int] = set()
@@ -199,6 +202,19 @@ class VrpnTracker(OpenTracker):
             what = f"only {len(distinct)} reports of a sensor in {self._timing.measure_s:g} s"
             raise BadInput(f"Port {self.port}: {what}, too few to measure the rate.", "Give it: --rate HZ.")
         return 1e6 * (len(distinct) - 1) / (distinct[-1] - distinct[0])
+
+    def _add_frames(self, frames: Sequence[TrackerFrame], now_s: float) -> None:
+        if self._pose_observer is not None:
+            if frames and not self._frames_begun:
+                self._frames_begun = True
+                clock = "seconds by the clock of the VRPN server"
+                assumed = {"length unit": ("m", "VRPN's convention")}
+                self._pose_observer.on_bodies(
+                    TrackedBodies(self._stations, self.port, clock, self.start_unix_s, assumed)
+                )
+            for frame in frames:
+                self._pose_observer.on_frame(frame)
+        super()._add_frames(frames, now_s)
 
     def _step(self) -> None:
         """Wait once for reports and process them."""

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from harness.core.network import resolve_host
+from harness.core.network import VRPN_PREFIX, resolve_host
 from harness.errors import BadInput, HarnessError, shorten
 from harness.stream.vrpn.messages import (
     COOKIE,
@@ -26,7 +26,6 @@ from harness.stream.vrpn.messages import (
     encode_description,
 )
 
-PREFIX = "vrpn:"
 _EXAMPLE = "Write vrpn:TRACKER@HOST[:PORT], such as vrpn:Tracker0@127.0.0.1:3883."
 _TYPES = (POSE, PING, PONG)
 _READ_BYTES = 1 << 16
@@ -47,7 +46,7 @@ class TrackerAddress:
     @classmethod
     def parse(cls, text: str) -> "TrackerAddress":
         """Split such a text; BadInput for another one."""
-        tracker, at, place = text.removeprefix(PREFIX).rpartition("@")
+        tracker, at, place = text.removeprefix(VRPN_PREFIX).rpartition("@")
         place = place.removeprefix("tcp://").removeprefix("tcp:")  # as VRPN's own programs write it
         host, colon, number = place.rpartition(":") if not place.endswith("]") else (place, "", "")
         if not colon:
