@@ -79,8 +79,8 @@ class VrpnTracker(OpenTracker):
         self._pose_observer = observer if isinstance(observer, PoseObserver) else None
         self.config, self._timing, self._on_report = config or VrpnConfig(), timing or VrpnTiming(), on_report
         self._address = TrackerAddress.parse(port)
-        self._lock, self._reconnects, self._trouble = threading.RLock(), 0, ""
-        self._frames_begun = False
+        self._lock, self._sessions, self._trouble = threading.RLock(), 0, "not streaming"
+        self._frames_begun = self._lost = False
         self._seen_s, self._pinged = self._monotonic_s(), False
         self._line: ServerConnection | None = None
         self._strange: set[int] = set()
@@ -126,7 +126,7 @@ class VrpnTracker(OpenTracker):
         """Numbers of `frames`, `records`, `copies` (redundant reports), reports of `other_sensors`, `clock_resets`,
         `reconnects`, and `out_of_range`, which is 0.
         """
-        return self._reader.counts | {"reconnects": self._reconnects, "out_of_range": 0}
+        return self._reader.counts | {"reconnects": max(self._sessions - 1, 0), "out_of_range": 0}
 
     @property
     def start_unix_s(self) -> float:
@@ -145,7 +145,11 @@ class VrpnTracker(OpenTracker):
                 self._line.close()
 
     def _open(self) -> None:
-        """Connect, and listen until the sensors and their rate are known."""
+        """Connect, and listen until the sensors and their rate are known.
+
+        The stream then takes a connection of its own: a server waits for a client that does not read, and a caller may
+        do other things first.
+        """
         self._line = ServerConnection(self._address, self._timing.connect_s)
         reports = self._listen(self._line)
         heard = Counter(report.sensor for report in reports)
@@ -154,7 +158,8 @@ class VrpnTracker(OpenTracker):
         self._strange.update(heard)
         self._rate_hz = self.config.rate_hz or self._measure_rate(reports)
         self._reader = ReportFrames(self._sensors, self._rate_hz)
-        self._seen_s = self._monotonic_s()
+        self._line.close()
+        self._line = None
 
     def _listen(self, line: ServerConnection) -> list[PoseReport]:
         """The reports of `measure_s`, after a first one that must come within `silent_s`. They are not delivered."""
@@ -223,7 +228,7 @@ class VrpnTracker(OpenTracker):
                 raise DriverClosed
             try:
                 if self._line is None:
-                    self._reconnect()
+                    self._connect()
                 else:
                     self._receive(self._line)
             except (ConnectionLost, MalformedMessage) as error:
@@ -259,17 +264,18 @@ class VrpnTracker(OpenTracker):
             self._report("unexpected", f"sensor {report.sensor} reports now and is left out: it is no station")
         self._add_frames(self._reader.add(report, now_s), now_s)
 
-    def _reconnect(self) -> None:
-        """Try once to connect again, after a pause."""
-        if self._closing.wait(self._timing.retry_s):
+    def _connect(self) -> None:
+        """Try once to connect; after a failure it waits before."""
+        if self._lost and self._closing.wait(self._timing.retry_s):
             raise DriverClosed
         self._line = ServerConnection(self._address, self._timing.connect_s)
-        self._reconnects += 1
+        self._sessions += 1
         self._seen_s = self._last_byte_s = self._monotonic_s()
         self._pinged = False
 
     def _lose(self, error: ConnectionLost | MalformedMessage) -> None:
         """Report a lost connection once, and close what is left of it."""
+        self._lost = True
         if self._closing.is_set():
             raise DriverClosed from error
         if self._line is not None:
