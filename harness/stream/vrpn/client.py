@@ -81,7 +81,9 @@ class VrpnTracker(OpenTracker):
         self._address = TrackerAddress.parse(port)
         self._lock, self._sessions, self._trouble = threading.RLock(), 0, "not streaming"
         self._frames_begun = self._lost = False
-        self._seen_s, self._pinged = self._monotonic_s(), False
+        self._seen_s = self._quiet_s = self._monotonic_s()
+        """Times of the latest report, and of the latest byte or ping [s]."""
+        self._pinged = False
         self._line: ServerConnection | None = None
         self._strange: set[int] = set()
         try:
@@ -244,15 +246,16 @@ class VrpnTracker(OpenTracker):
             now_s = self._monotonic_s()
             self._add_frames(self._reader.expire(now_s), now_s)
         if line.received_bytes > before:
-            self._last_byte_s, self._pinged = now_s, False
+            self._last_byte_s = self._quiet_s = now_s
+            self._pinged = False
         if reported:
             self._seen_s = now_s
             self._tell("connected", "", f"{self._address.tracker} reports: {len(self._stations)} sensors")
-        elif now_s - max(self._seen_s, self._last_byte_s) > self._timing.silent_s:
+        elif now_s - self._quiet_s > self._timing.silent_s:
             if self._pinged:
                 raise ConnectionLost("the server does not answer")
             line.ping()
-            self._pinged, self._last_byte_s = True, now_s
+            self._pinged, self._quiet_s = True, now_s
         elif now_s - self._seen_s > self._timing.silent_s:
             self._tell("silent", "silent", f"no report for {now_s - self._seen_s:.1f} s")
 
@@ -270,7 +273,7 @@ class VrpnTracker(OpenTracker):
             raise DriverClosed
         self._line = ServerConnection(self._address, self._timing.connect_s)
         self._sessions += 1
-        self._seen_s = self._last_byte_s = self._monotonic_s()
+        self._seen_s = self._quiet_s = self._monotonic_s()
         self._pinged = False
 
     def _lose(self, error: ConnectionLost | MalformedMessage) -> None:
