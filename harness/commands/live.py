@@ -142,6 +142,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         control = SessionControl(RecordingSwitch(note))
         outputs = open_outputs(output_options, setup, control, opened, print_status)
         device = opened.enter_context(_open_device(args.port, config, playback, events, control.recorder))
+        device.pause()  # learning takes a while
         examples = len(playback.clip_evaluation.subject.example_names)
         print_status(f"learning {args.method} from {examples} clips of {playback.scenario.name}")
         with redirect_stdout(sys.stderr):  # a method may print; stdout is for data

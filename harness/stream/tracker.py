@@ -101,6 +101,9 @@ class OpenTracker(ABC):
         """(S,) time of measurement of each station since 1970 [s]; call it once for each frame, in order."""
         return self._unix_times(frame)
 
+    def pause(self) -> None:  # noqa: B027  # the default does nothing: a line of bytes is started by the first read
+        """Tell a tracker that streams already that frames are not needed before the iteration begins."""
+
     def __iter__(self) -> Iterator[TrackerFrame]:
         """Yield frames as they become complete, until the driver is closed.
 

@@ -86,6 +86,8 @@ class VrpnTracker(OpenTracker):
         self._pinged = False
         self._line: ServerConnection | None = None
         self._strange: set[int] = set()
+        self._heard: list[tuple[PoseReport, float]] = []
+        """Reports that came while the tracker was opened, and when [s]."""
         try:
             self._open()
         except (ConnectionLost, MalformedMessage) as error:
@@ -140,6 +142,14 @@ class VrpnTracker(OpenTracker):
         out: Floats = frame.measured_s + self.start_unix_s
         return out
 
+    def pause(self) -> None:
+        """Leave the server until frames are read: it waits for a client that does not read, and so do its others."""
+        with self._lock:
+            self._heard, self._sessions = [], 0
+            if self._line is not None:
+                self._line.close()
+                self._line = None
+
     def close(self) -> None:
         self._closing.set()
         with self._lock:
@@ -147,28 +157,25 @@ class VrpnTracker(OpenTracker):
                 self._line.close()
 
     def _open(self) -> None:
-        """Connect, and listen until the sensors and their rate are known.
-
-        The stream then takes a connection of its own: a server waits for a client that does not read, and a caller may
-        do other things first.
-        """
+        """Connect, and listen until the sensors and their rate are known."""
         self._line = ServerConnection(self._address, self._timing.connect_s)
-        reports = self._listen(self._line)
+        self._sessions = 1
+        self._heard = self._listen(self._line)
+        reports = [report for report, _ in self._heard]
         heard = Counter(report.sensor for report in reports)
         self._sensors, self._stations = self._select(sorted(heard))
         self._unread = ", ".join(str(sensor) for sensor in sorted(heard) if sensor not in self._sensors)
         self._strange.update(heard)
         self._rate_hz = self.config.rate_hz or self._measure_rate(reports)
         self._reader = ReportFrames(self._sensors, self._rate_hz)
-        self._line.close()
-        self._line = None
+        self._seen_s = self._quiet_s = self._monotonic_s()
 
-    def _listen(self, line: ServerConnection) -> list[PoseReport]:
-        """The reports of `measure_s`, after a first one that must come within `silent_s`. They are not delivered."""
-        reports: list[PoseReport] = []
+    def _listen(self, line: ServerConnection) -> list[tuple[PoseReport, float]]:
+        """The reports of `measure_s`, and when each was received [s]; the first must come within `silent_s`."""
+        reports: list[tuple[PoseReport, float]] = []
         until_s = self._monotonic_s() + self._timing.silent_s
         while (left_s := until_s - self._monotonic_s()) > 0.0:
-            new = list(line.receive(min(left_s, self._timing.poll_s)))
+            new = [(report, self._monotonic_s()) for report in line.receive(min(left_s, self._timing.poll_s))]
             if new and not reports:
                 until_s = self._monotonic_s() + self._timing.measure_s
             reports += new
@@ -229,7 +236,11 @@ class VrpnTracker(OpenTracker):
             if self._closing.is_set():
                 raise DriverClosed
             try:
-                if self._line is None:
+                if self._heard:
+                    heard, self._heard = self._heard, []
+                    for report, at_s in heard:
+                        self._take(report, at_s)
+                elif self._line is None:
                     self._connect()
                 else:
                     self._receive(self._line)
@@ -250,7 +261,6 @@ class VrpnTracker(OpenTracker):
             self._pinged = False
         if reported:
             self._seen_s = now_s
-            self._tell("connected", "", f"{self._address.tracker} reports: {len(self._stations)} sensors")
         elif now_s - self._quiet_s > self._timing.silent_s:
             if self._pinged:
                 raise ConnectionLost("the server does not answer")
@@ -261,6 +271,8 @@ class VrpnTracker(OpenTracker):
 
     def _take(self, report: PoseReport, now_s: float) -> None:
         """Deliver a report."""
+        if self._trouble:
+            self._tell("connected", "", f"{self._address.tracker} reports: {len(self._stations)} sensors")
         self._on_report(report, now_s)
         if report.sensor not in self._strange:
             self._strange.add(report.sensor)

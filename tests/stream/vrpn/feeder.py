@@ -50,9 +50,9 @@ def fed_server(port: int = 0, sensors: tuple[int, ...] = (0, 1)) -> Iterator[Fee
             feeder.stop()
 
 
-def port_of(feeder: Feeder, tracker: str = TRACKER) -> str:
+def port_of(server: VrpnServer, tracker: str = TRACKER) -> str:
     """What the client opens."""
-    return f"vrpn:{tracker}@127.0.0.1:{feeder.server.port}"
+    return f"vrpn:{tracker}@127.0.0.1:{server.port}"
 
 
 @contextmanager

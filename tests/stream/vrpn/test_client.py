@@ -3,6 +3,7 @@
 import socket
 import struct
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from itertools import islice
@@ -57,7 +58,7 @@ def open_quick(port: str, config: VrpnConfig | None = None, **callbacks: object)
 
 def test_every_report_arrives_with_every_digit(fed: Feeder) -> None:
     reports: list[PoseReport] = []
-    with open_quick(port_of(fed), on_report=lambda report, now_s: reports.append(report)) as tracker:
+    with open_quick(port_of(fed.server), on_report=lambda report, now_s: reports.append(report)) as tracker:
         assert tracker.stations == ("0", "1")
         frames = list(islice(tracker, 60))
         start_s = tracker.start_unix_s
@@ -76,17 +77,17 @@ def test_every_report_arrives_with_every_digit(fed: Feeder) -> None:
 
 
 def test_it_is_a_stream_as_any_other(fed: Feeder) -> None:
-    check_stream(lambda: open_quick(port_of(fed)), rate_hz=90.0, at_most=30)
+    check_stream(lambda: open_quick(port_of(fed.server)), rate_hz=90.0, at_most=30)
 
 
 def test_a_user_names_sensors(fed: Feeder) -> None:
-    with open_quick(port_of(fed), VrpnConfig(("head",), (1,))) as tracker:
+    with open_quick(port_of(fed.server), VrpnConfig(("head",), (1,))) as tracker:
         assert (tracker.stations, tracker.sensors, tracker.station_list) == (("head",), (1,), "1 head; not read: 0")
         assert 50.0 < tracker.rate_hz < 150.0
         (frame,) = islice(tracker, 1)
         assert frame.position_m[0, 1] == -1.0 / 7.0
         assert tracker.counts["other_sensors"] > 0
-    with open_quick(port_of(fed), VrpnConfig(("a",))) as tracker:
+    with open_quick(port_of(fed.server), VrpnConfig(("a",))) as tracker:
         assert tracker.station_list == "0 a; not read: 1"
 
 
@@ -99,7 +100,7 @@ def test_a_user_names_sensors(fed: Feeder) -> None:
 )
 def test_a_sensor_that_does_not_report_is_refused(fed: Feeder, config: VrpnConfig, problem: str) -> None:
     with pytest.raises(BadInput, match=problem):
-        open_quick(port_of(fed), config)
+        open_quick(port_of(fed.server), config)
 
 
 def test_contradictory_names_are_refused() -> None:
@@ -133,7 +134,7 @@ def test_what_is_no_address_is_refused(text: str) -> None:
 
 def test_a_server_without_the_tracker_is_refused_with_its_trackers(fed: Feeder) -> None:
     with pytest.raises(BadInput, match=r"no tracker called Head. It has Tracker0;"):
-        open_quick(port_of(fed, "Head"))
+        open_quick(port_of(fed.server, "Head"))
 
 
 def test_nobody_at_the_port_is_refused() -> None:
@@ -193,7 +194,7 @@ def test_a_server_that_returns_is_found_again() -> None:
     with ExitStack() as servers:
         feeder = servers.enter_context(fed_server())
         port = feeder.server.port
-        with open_quick(port_of(feeder), on_event=events.append) as tracker:
+        with open_quick(port_of(feeder.server), on_event=events.append) as tracker:
             frames = iter(tracker)
             list(islice(frames, 5))
             servers.close()
@@ -270,7 +271,7 @@ def test_a_silent_server_is_pinged_and_given_up_if_it_does_not_answer(answers: b
 
 def test_a_sensor_that_joins_later_is_told_once(fed: Feeder) -> None:
     events: list[LineEvent] = []
-    with open_quick(port_of(fed), on_event=events.append) as tracker:
+    with open_quick(port_of(fed.server), on_event=events.append) as tracker:
         fed.sensors = (0, 1, 8)
         for _ in tracker:
             if tracker.counts["other_sensors"] > 3:
@@ -280,13 +281,22 @@ def test_a_sensor_that_joins_later_is_told_once(fed: Feeder) -> None:
 
 
 def test_closing_ends_the_iteration_from_another_thread(fed: Feeder) -> None:
-    with open_quick(port_of(fed)) as tracker:
+    with open_quick(port_of(fed.server)) as tracker:
         frames = iter(tracker)
         next(frames)
         thread = threading.Thread(target=tracker.close)
         thread.start()
         assert len(list(frames)) < 1000
         thread.join()
+
+
+def test_after_a_pause_only_what_comes_then_is_delivered(fed: Feeder) -> None:
+    with open_quick(port_of(fed.server)) as tracker:
+        tracker.pause()
+        paused_s = time.time()
+        frames = list(islice(tracker, 3))
+        assert np.nanmin(tracker.measured_unix_s(frames[0])) > paused_s
+        assert tracker.counts["reconnects"] == 0
 
 
 class Seen:
@@ -307,7 +317,7 @@ class Seen:
 
 def test_an_observer_sees_the_bodies_once_and_then_every_frame(fed: Feeder) -> None:
     seen = Seen()
-    with open_quick(port_of(fed), observer=seen) as tracker:
+    with open_quick(port_of(fed.server), observer=seen) as tracker:
         frames = list(islice(tracker, 5))
         start_s = tracker.start_unix_s
     others = [call for call in seen.calls if not isinstance(call, LineEvent)]
