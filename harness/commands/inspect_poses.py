@@ -7,9 +7,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.flags import repeat_flags
+from harness.commands.flags import POSE_FLAGS, pose_options, repeat_flags
 from harness.commands.output import print_result
-from harness.commands.pose_flags import POSE_FLAGS, pose_options, read_poses
+from harness.commands.pose_reading import read_poses
 from harness.core.number_format import format_fixed, format_share
 from harness.core.text_table import Table
 from harness.errors import Outcome
