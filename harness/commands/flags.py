@@ -7,20 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 from harness.core.options import expand_alternatives, split_outside_brackets
 from harness.core.output_place import place_fault
-from harness.core.units import TIME_UNITS_S, parse_length_unit
 from harness.errors import BadFile, BadInput, Outcome
 
 if TYPE_CHECKING:
     from harness.experiment.methods import Isolation
-    from harness.stream import PoseFileOptions
 
 Verbs = Any  # argparse's subparsers object has no public type
 MOST_PROCESSES = 1024
 """Most worker processes on one computer [choice]."""
 LINE_FLAGS = ("items", "baud", "quality", "keep_settings", "boresight", "alignment")
 """Flags of `add_line_flags`, as attributes of the parsed command line."""
-POSE_FLAGS = ("columns", "unit", "quaternion", "up", "time_unit", "rate")
-"""Flags of `add_pose_flags`, as attributes of the parsed command line."""
 STATION_CHARACTERS = "123456789ABC"
 """Characters of the stations that a device may have (docs/is900.md 5)."""
 Action = Callable[[argparse.Namespace], Outcome]
@@ -125,31 +121,6 @@ def add_line_flags(
     verb.add_argument("--boresight", action="store_true", default=None, help=text)
     text = "frame to report in: its origin, a point on +X and a point on +Y, nine numbers in the present frame [m]"
     verb.add_argument("--alignment", type=parse_alignment, metavar="X,Y,Z,X,Y,Z,X,Y,Z", help=text)
-
-
-def add_pose_flags(verb: argparse.ArgumentParser, *, shared: Sequence[str] = ()) -> None:
-    """Add the flags by which a user overrides what a file of poses shows; `shared` ones the verb has already."""
-    poses = verb.add_argument_group("of poses of other programs (TUM, EuRoC, CSV, matrices), in place of the evidence")
-    text = "names of the columns in their order, such as time,x,y,z,qx,qy,qz,qw; - for others"
-    poses.add_argument("--columns", metavar="A,B", help=text)
-    poses.add_argument("--quaternion", metavar="ORDER", help="order of a quaternion: xyzw or wxyz")
-    poses.add_argument("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y or -z (write --up=-y)")
-    poses.add_argument("--time-unit", metavar="U", help=f"unit of times: {', '.join(TIME_UNITS_S)}")
-    if "unit" not in shared:
-        text = "unit of length: mm, cm, m, in, ft, or metres per unit"
-        poses.add_argument("--unit", metavar="M", type=parse_length_unit, help=text)
-    if "rate" not in shared:
-        poses.add_argument("--rate", metavar="HZ", type=float, help="samples per second of a file without times")
-
-
-def pose_options(args: argparse.Namespace, *, untimed: bool = False) -> "PoseFileOptions":
-    """What the flags say; `untimed` reads files without times and rate all the same. Raises BadInput."""
-    from harness.stream import PoseFileOptions
-
-    columns = split_list(args.columns)
-    return PoseFileOptions(
-        tuple(columns) if columns else None, args.unit, args.quaternion, args.up, args.time_unit, args.rate, untimed
-    )
 
 
 def refuse_flags(args: argparse.Namespace, names: Iterable[str], where: str, advice: str) -> None:

@@ -4,15 +4,14 @@ import argparse
 from pathlib import Path
 
 from harness.commands.flags import (
-    POSE_FLAGS,
     Verbs,
-    add_pose_flags,
     add_verb,
     output_file,
     refuse_flags,
     repeat_flags,
 )
 from harness.commands.output import print_result
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags
 from harness.core.file_kind import file_kind
 from harness.core.units import parse_length_unit
 from harness.errors import Outcome

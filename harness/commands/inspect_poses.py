@@ -7,9 +7,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.flags import POSE_FLAGS, pose_options, repeat_flags
+from harness.commands.flags import repeat_flags
 from harness.commands.output import print_result
-from harness.commands.pose_reading import read_poses
+from harness.commands.pose_flags import POSE_FLAGS, pose_options, read_poses
 from harness.core.number_format import format_fixed, format_share
 from harness.core.text_table import Table
 from harness.errors import Outcome
@@ -56,9 +56,12 @@ def inspect_poses(args: argparse.Namespace, paths: Sequence[Path]) -> Outcome:
         "marks": [{"at_s": at_s, "stretch": stretch} for at_s, stretch in found.marks],
         "damage": list(found.damage),
     }
-    following = ["characterize", *paths, *repeat_flags(args, *POSE_FLAGS)]
+    flags = repeat_flags(args, *POSE_FLAGS)
+    following = ["characterize", *paths, *flags]
+    if len(paths) > 1:
+        following = ["validate", paths[0], "--truth", paths[1], *flags]
     if not timed:
-        following = ["inspect", *paths, *repeat_flags(args, *POSE_FLAGS), "--rate", "HZ"]
+        following = ["inspect", *paths, *flags, "--rate", "HZ"]
     return print_result(args, content, *lines, following=following)
 
 

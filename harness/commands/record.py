@@ -8,22 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 from harness.commands.flags import (
     LINE_FLAGS,
-    POSE_FLAGS,
     Verbs,
     add_line_flags,
-    add_pose_flags,
     add_verb,
     is_whole_number,
     line_options,
     output_link,
     parse_device_names,
     parse_names,
-    pose_options,
     refuse_flags,
 )
 from harness.commands.output import print_result, print_status, recording_note, show_progress
 from harness.commands.playback_flags import PlaybackOptions, open_playback
-from harness.commands.pose_reading import holds_poses, read_poses
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
 from harness.core.package_data import VERSION
 from harness.errors import BadInput, Outcome
 

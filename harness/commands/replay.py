@@ -9,18 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.commands.flags import (
-    POSE_FLAGS,
     Verbs,
-    add_pose_flags,
     add_verb,
     parse_methods,
     parse_names,
-    pose_options,
     refuse_flags,
     repeat_flags,
 )
 from harness.commands.output import print_caveat, print_data, print_result, print_status
-from harness.commands.pose_reading import holds_poses, read_poses
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
 from harness.core.number_format import format_fixed
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome

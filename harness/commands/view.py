@@ -8,18 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.commands.flags import (
-    POSE_FLAGS,
     Verbs,
-    add_pose_flags,
     add_verb,
     output_file,
     parse_methods,
-    pose_options,
     positive_float,
     refuse_flags,
 )
 from harness.commands.output import print_result, print_status
-from harness.commands.pose_reading import holds_poses, read_poses
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 

@@ -70,6 +70,7 @@ def test_inspect_reads_several_files_on_one_clock(folder: Path, command: Command
     assert shown.lines[0].startswith(f"rig.tum, hand.tum: {2 * COUNT} poses of 2 bodies, ")
     assert shown.lines[0].endswith("Unix time from 2014-06-24 19:02:59 UTC")
     assert "common clock: one for all files (assumed: Unix times)" in shown.lines
+    assert shown.line("next: ") == "harness validate rig.tum --truth hand.tum"
 
 
 def test_a_recording_keeps_poses_marks_and_the_plan(folder: Path, command: Command) -> None:
