@@ -343,10 +343,7 @@ KINDS: dict[str, Kind] = {
         Kind("method options", _write("x.txt", OPTIONS), ("*",), TEXT, _read_options),
         Kind("calibration", _make_calibration, ("*",), TOML, _read_calibration, mend=mend_calibration),
         Kind("recording", _make_recording, ("*",), RECORDING, _read_recording, "replay {}/x.rec --frames"),
-        *(
-            _pose_kind(name, pose_files.SAMPLES[name])
-            for name in ("tum", "euroc", "no names", "semicolons and decimal commas")
-        ),
+        *(_pose_kind(name, pose_files.SAMPLES[name]) for name in ("tum", "euroc", "no names", "tabs", "quotes")),
         *(_pose_kind(name, pose_files.UNTIMED[name]) for name in ("matrices", "kitti")),
         _pose_kind("of optitrack", pose_files.motive(range(5))),
         _pose_kind("of vicon", pose_files.vicon_tracker()),
