@@ -265,7 +265,7 @@ class _RowReader:
         return code
 
     def _read_lines(self, first_line: int, text: str, last: bool) -> tuple[Floats, Ints]:
-        """The same, line by line: for pieces with comments, quotes, words for missing numbers, or a damaged line."""
+        """Read lines one by one: pieces with comments, quotes, words for missing numbers, or a damaged line."""
         head, rows, codes = self._head, [], []
         lines = text.split("\n")
         for number, line in enumerate(lines, first_line):
