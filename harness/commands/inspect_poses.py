@@ -56,9 +56,12 @@ def inspect_poses(args: argparse.Namespace, paths: Sequence[Path]) -> Outcome:
         "marks": [{"at_s": at_s, "stretch": stretch} for at_s, stretch in found.marks],
         "damage": list(found.damage),
     }
-    following = ["characterize", *paths, *repeat_flags(args, *POSE_FLAGS)]
+    flags = repeat_flags(args, *POSE_FLAGS)
+    following = ["characterize", *paths, *flags]
+    if len(paths) > 1:
+        following = ["validate", paths[0], "--truth", paths[1], *flags]
     if not timed:
-        following = ["inspect", *paths, *repeat_flags(args, *POSE_FLAGS), "--rate", "HZ"]
+        following = ["inspect", *paths, *flags, "--rate", "HZ"]
     return print_result(args, content, *lines, following=following)
 
 

@@ -28,7 +28,6 @@ _HEAD_CHARACTERS = MEGABYTE
 _PIECE_CHARACTERS = 4 * MEGABYTE
 _LONGEST_LINE = 8 * MEGABYTE
 _MOST_NAMES = 1000
-UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _COMMENT = re.compile(r"\s*(#|%|//)+")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,9})?")
 _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
@@ -125,7 +124,7 @@ def _read_beginning(path: Path) -> tuple[str, bool]:
 def _open_text(path: Path) -> io.TextIOWrapper:
     """A file as text with line ends of one kind; UTF-16 where its first bytes say so. Raises BadFile."""
     file = open_input_file(path, EXPECTED_FILE, MAX_BYTES)
-    utf16 = file.read(2) in UTF16_MARKS
+    utf16 = file.read(2) in (b"\xff\xfe", b"\xfe\xff")
     file.seek(0)
     return io.TextIOWrapper(file, "utf-16" if utf16 else "utf-8-sig", errors="replace")
 
@@ -266,7 +265,7 @@ class _RowReader:
         return code
 
     def _read_lines(self, first_line: int, text: str, last: bool) -> tuple[Floats, Ints]:
-        """The same, line by line: for pieces with comments, quotes, words for missing numbers, or a damaged line."""
+        """Read lines one by one: pieces with comments, quotes, words for missing numbers, or a damaged line."""
         head, rows, codes = self._head, [], []
         lines = text.split("\n")
         for number, line in enumerate(lines, first_line):

@@ -42,6 +42,8 @@ _LOST_SHARE = 0.05
 there count as not seen [choice]."""
 _CUT_NORMS, _EXACT_NORM = 3.0, 1e-8
 """Deviations of a norm from 1 that show a row to be cut: in those of the other rows, and above that of exact ones."""
+_FARTHEST, _LONGEST_S = 1e9, 1e10
+"""Largest coordinate, in the file's unit, and longest log: three centuries [s] [choices]."""
 UNTIMED = "numbers of samples"
 """Clock of a log whose source has no times, where no rate was given either."""
 
@@ -229,8 +231,10 @@ def _conclude_clock(
     unit = conclude_time_unit(times, columns.time_unit, options.time_unit)
     findings.append(unit)
     scale_s = TIME_UNITS_S[unit.value]
-    if not np.isfinite(scale_s * (times[-1] - times[0])):
-        raise BadFile(path, "times that are too large", EXPECTED_FILE, "Are the columns right?")
+    with np.errstate(over="ignore"):
+        length_s = scale_s * (times[-1] - times[0])
+    if not length_s <= _LONGEST_S:
+        raise BadFile(path, f"times that span {length_s:.3g} s", EXPECTED_FILE, "Are columns and --time-unit right?")
     unix = UNIX_S[0] <= times[0] * scale_s <= UNIX_S[1]
     return scale_s, "Unix time" if unix else "seconds from an unknown start"
 
@@ -250,6 +254,10 @@ def _seen_rows(path: Path, raw: _RawPoses, findings: list[FileFinding], *, cut: 
     if len(wrong):
         found = f"a quaternion of norm {norm[wrong[0]]:.3g} in row {wrong[0] + 1} of {raw.name}"
         raise BadFile(path, found, "unit quaternions", "Name the columns with --columns, or remove damaged rows.")
+    far = np.flatnonzero(present & (np.abs(raw.positions) > _FARTHEST).any(axis=1))
+    if len(far):
+        found = f"a position of {np.abs(raw.positions[far[0]]).max():.3g} in row {far[0] + 1} of {raw.name}"
+        raise BadFile(path, found, "coordinates in a unit of length", "Are the columns right?")
     zero = present & ~raw.positions.any(axis=1)
     if zero.any() and not zero[present].all():
         present &= ~_lost_at_origin(raw.positions, present, zero)

@@ -21,12 +21,11 @@ from harness.core.file_kind import POSES_KIND, file_kind
 from harness.core.files import atomic_path, require_writable
 from harness.core.input_file import open_input_file, read_input_file
 from harness.errors import BadFile, BadInput, HarnessError
-from harness.stream.poses.number_table import UTF16_MARKS
+from harness.stream.poses.number_table import read_head
 from harness.stream.poses.options import PoseFileOptions
 from harness.stream.poses.pose_file import read_pose_log
 from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
 from harness.stream.recording.blocks import (
-    BLOCK_MARKER,
     BODIES,
     MARK,
     MAX_PAYLOAD_BYTES,
@@ -45,7 +44,6 @@ EXPECTED_POSES = "a recording of poses by `harness record`"
 POSE_ROW = np.dtype([("body", "<u4"), ("time_s", "<f8"), ("position_m", "<f8", 3), ("quaternion", "<f8", 4)])
 """A row of a block of poses."""
 _ROWS_PER_BLOCK = MAX_PAYLOAD_BYTES // POSE_ROW.itemsize
-_TEXT_BYTES = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,15 +82,16 @@ def is_pose_recording(path: Path) -> bool:
 
 
 def is_pose_file(path: Path) -> bool:
-    """Whether a file is a recording of poses, or a text of no other kind; False for what is no file."""
+    """Whether a file is a recording of poses, or text with rows of numbers that no other verb reads."""
     if not path.is_file():
         return False
-    with open_input_file(path, EXPECTED_POSES, MAX_BYTES) as file:
-        data = file.read(_TEXT_BYTES)
-    if data.startswith(UTF16_MARKS):
+    if file_kind(path) == POSES_KIND:
         return True
-    kind = file_kind(path)
-    return kind == POSES_KIND or (not kind and b"\0" not in data and BLOCK_MARKER not in data)
+    try:
+        read_head(path)
+    except BadFile:
+        return False
+    return True
 
 
 def write_pose_recording(

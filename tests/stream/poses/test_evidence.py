@@ -13,22 +13,25 @@ from harness.stream.poses.evidence import (
 )
 from tests.stream.poses.pose_files import POSITIONS_M, QUATERNIONS, TIMES_S, XYZW
 
+SLOW = np.linspace(0.0, 4.8, 9)
+"""1.7 Hz in seconds, or 1.7 kHz in milliseconds."""
+
 
 @pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
 @pytest.mark.parametrize("start_s", [0.0, 1.5e9])
 @pytest.mark.parametrize("step_s", [0.002, 0.01, 0.1])
 def test_the_size_of_steps_shows_the_unit_of_time(unit: str, start_s: float, step_s: float) -> None:
     length_s = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[unit]
-    found = conclude_time_unit((start_s + step_s * np.arange(50)) / length_s, "", None)
+    found = conclude_time_unit((start_s + step_s * np.arange(50.0)) / length_s, "", None)
     assert (found.value, found.assumed) == (unit, False)
     assert ("Unix time of 2017-07-14" in found.reason) == (start_s > 0.0)
 
 
 def test_a_step_that_may_be_two_units_is_an_assumption() -> None:
-    assert conclude_time_unit(0.6 * np.arange(9), "", None).assumed  # 1.7 Hz in seconds, or 1.7 kHz in milliseconds
+    assert conclude_time_unit(SLOW, "", None).assumed
     assert conclude_time_unit(np.zeros(1), "", None).assumed
-    assert conclude_time_unit(0.6 * np.arange(9), "s", None).reason == "the column's name"
-    assert conclude_time_unit(0.6 * np.arange(9), "s", "ms").value == "ms"
+    assert conclude_time_unit(SLOW, "s", None).reason == "the column's name"
+    assert conclude_time_unit(SLOW, "s", "ms").value == "ms"
 
 
 def test_whole_steps_of_one_are_numbers_of_samples() -> None:

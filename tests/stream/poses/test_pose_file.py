@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.core import rotations
-from harness.core.arrays import Floats
+from harness.core.arrays import Ints
 from harness.errors import BadFile, BadInput
 from harness.stream.poses.options import PoseFileOptions
 from harness.stream.poses.pose_file import UNTIMED as UNTIMED_CLOCK
@@ -44,7 +44,7 @@ def finding(log: PoseLog, subject: str) -> FileFinding:
     return found
 
 
-def assert_motion(body: BodyPoses, kept: slice | Floats = slice(None)) -> None:
+def assert_motion(body: BodyPoses, kept: slice | Ints = slice(None)) -> None:
     np.testing.assert_allclose(body.times_s, TIMES_S[kept] - TIMES_S[kept][0], atol=1e-6)
     np.testing.assert_allclose(body.positions_m, POSITIONS_M[kept], atol=1e-6)
     assert rotations.angle_between_rad(body.quaternions, QUATERNIONS[kept]).max() < 1e-6
