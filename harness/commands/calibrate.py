@@ -135,7 +135,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
     from harness.experiment import CalibrationSession, select_stations
     from harness.experiment.scenarios import load_scenario
     from harness.live import PoseTerminal, ViewerOutput
-    from harness.stream import open_tracker
+    from harness.stream import open_tracker_at
 
     if args.scenario is None:
         raise BadInput("--port without --scenario.", "Name the scenario with the stations: --scenario NAME.")
@@ -153,7 +153,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
             displays.append(view)
         config = tracker_config(args, args.port, stations)
         device = opened.enter_context(
-            open_tracker(args.port, config, on_event=lambda event: print_status(f"line: {event.text}"))
+            open_tracker_at(args.port, config, on_event=lambda event: print_status(f"line: {event.text}"))
         )
         where = f"{device.identification or 'an IS-900'} at {args.port}"
         print_status(f"{where}; stations {device.station_list}; Ctrl-C ends it")

@@ -202,10 +202,10 @@ def _open_device(
     recorder: "RecordingSwitch | None" = None,
 ) -> "Iterator[OpenTracker]":
     """Open and set up the tracker; BadInput when its rate is not the scenario's."""
-    from harness.stream import open_tracker
+    from harness.stream import open_tracker_at
 
     rate_hz = playback.tracker.rate_hz
-    with open_tracker(port, config, observer=recorder, on_event=events) as device:
+    with open_tracker_at(port, config, observer=recorder, on_event=events) as device:
         runs_hz = device.rate_hz
         if abs(runs_hz - rate_hz) > _RATE_TOLERANCE * rate_hz:
             raise BadInput(

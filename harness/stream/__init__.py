@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from harness.stream.host_clock import HostClockEstimator, UnixTimeEstimator
     from harness.stream.inputs import INPUT_COMBINATIONS, make_inputs
     from harness.stream.line_events import EventCounter, LineEvent
-    from harness.stream.ports import TrackerConfig, open_tracker
+    from harness.stream.ports import TrackerConfig, open_tracker_at
     from harness.stream.poses.options import PoseFileOptions
     from harness.stream.poses.pose_file import UNTIMED
     from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
@@ -41,6 +41,6 @@ __all__ = [
     "frame_rows",
     "make_inputs",
     "measure_sampling",
-    "open_tracker",
+    "open_tracker_at",
     "split_frames",
 ]

@@ -2,8 +2,7 @@
 
 from collections.abc import Callable
 
-from harness.stream.is900 import DriverConfig
-from harness.stream.is900 import open_tracker as open_is900
+from harness.stream.is900 import DriverConfig, open_tracker
 from harness.stream.line_events import LineEvent, LineObserver
 from harness.stream.tracker import OpenTracker
 from harness.stream.vrpn import VrpnConfig, VrpnTracker
@@ -12,7 +11,7 @@ TrackerConfig = DriverConfig | VrpnConfig
 """Settings of a tracker of any family."""
 
 
-def open_tracker(
+def open_tracker_at(
     port: str,
     config: TrackerConfig,
     *,
@@ -22,4 +21,4 @@ def open_tracker(
     """Open and set up the tracker at a port: `vrpn:Tracker0@host`, or the line of an IS-900. Raises BadInput."""
     if isinstance(config, VrpnConfig):
         return VrpnTracker(port, config, observer=observer, on_event=on_event)
-    return open_is900(port, config, observer=observer, on_event=on_event)
+    return open_tracker(port, config, observer=observer, on_event=on_event)

@@ -19,7 +19,7 @@ from harness.core.arrays import Floats
 from harness.errors import BadFile
 from harness.stream.frame import TrackerFrame
 from harness.stream.line_events import EventCounter
-from harness.stream.ports import TrackerConfig, open_tracker
+from harness.stream.ports import TrackerConfig, open_tracker_at
 from harness.stream.recording.pose_writer import open_writer, read_stretch_marks
 from harness.stream.recording.recorder import tracked_text
 from harness.stream.recording.recording import RecordingWriter
@@ -84,7 +84,7 @@ def capture_stretches(
     events = EventCounter(log)
     with (
         open_writer(path, note, config) as writer,
-        open_tracker(port, config, observer=writer, on_event=events) as device,
+        open_tracker_at(port, config, observer=writer, on_event=events) as device,
         closing(_frames(device, path)) as frames,
     ):
         log(f"{device.identification or 'a device'} at {port}; stations {device.station_list}")

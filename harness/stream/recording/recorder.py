@@ -12,7 +12,7 @@ from harness.errors import BadInput, HarnessError
 from harness.stream.frame import TrackerFrame
 from harness.stream.is900.codec.reader import WireFormat
 from harness.stream.line_events import EventCounter, LineEvent, TrackedBodies
-from harness.stream.ports import TrackerConfig, open_tracker
+from harness.stream.ports import TrackerConfig, open_tracker_at
 from harness.stream.recording.blocks import POSES, RECEIVED
 from harness.stream.recording.pose_writer import PoseRecordingWriter
 from harness.stream.recording.recording import RecordingWriter
@@ -129,7 +129,7 @@ def record_port(
 
     counts: dict[str, int] = {}
     events = EventCounter(log)
-    with _count_interrupt(counts), open_tracker(port, config, observer=writer, on_event=events) as device:
+    with _count_interrupt(counts), open_tracker_at(port, config, observer=writer, on_event=events) as device:
         name = device.identification or "a device"
         log(f"{name} at {port}; stations {device.station_list}; Ctrl-C ends the recording")
         log(device.setup_note)
