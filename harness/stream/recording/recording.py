@@ -28,7 +28,7 @@ from itertools import islice, pairwise
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Self
 
 import numpy as np
 
@@ -368,7 +368,7 @@ class RecordingWriter:
                 if self._new and self.empty:
                     self.path.unlink(missing_ok=True)
 
-    def __enter__(self) -> "RecordingWriter":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(

@@ -63,7 +63,7 @@ def test_half_a_pose_and_a_pose_that_is_not_later_are_left_out(tmp_path: Path) -
         writer.on_frame(frame_at(0.0, 0.0))
         lost = frame_at(0.01, 0.01)
         no_turn = np.where([[True], [False]], lost.tracker_from_station, np.nan)
-        writer.on_frame(replace(lost, orientation_valid=[True, False], tracker_from_station=no_turn))
+        writer.on_frame(replace(lost, orientation_valid=np.array([True, False]), tracker_from_station=no_turn))
         writer.on_frame(frame_at(0.01, 0.02))
         assert writer.counts["left_out"] == 1
     assert times_of(path) == [[0.0, 0.01], [0.0, 0.02]]

@@ -19,7 +19,7 @@ def test_only_whole_poses_become_reports() -> None:
     place[2], turn[1] = np.nan, np.nan
     turned = np.array([True, False, True, True])
     measured = np.array([1.0, 1.0, 1.0, np.nan])
-    frame = TrackerFrame(2.0, measured, place, turn, valid, turned, [1.0] * 4, [False] * 4)
+    frame = TrackerFrame(2.0, measured, place, turn, valid, turned, np.ones(4), np.zeros(4, bool))
     assert frame_reports(frame, 1.7e9 + measured) == [
         PoseReport(0, 1_700_000_001_000_000, (0.0, 1.0, 2.0), (0.6, 0.0, 0.8, 0.0))
     ]
