@@ -16,6 +16,8 @@ from harness.stream.vrpn.report_frames import ReportFrames
 
 _FEWEST_REPORTS = 10
 """Fewest reports of one sensor from which the rate is measured."""
+_MOST_SENSORS = 1000
+"""Most sensors that are read at once, and that are told of."""
 
 
 @dataclass(frozen=True)
@@ -198,6 +200,9 @@ class VrpnTracker(OpenTracker):
         names = self.config.stations
         sensors = self.config.sensors or tuple(heard if names is None else heard[: len(names)])
         missing = [str(sensor) for sensor in sensors if sensor not in heard]
+        if len(sensors) > _MOST_SENSORS:
+            advice = f"Name at most {_MOST_SENSORS:,} of them, as in --stations head=0,torso=1."
+            raise BadInput(f"Port {self.port}: {len(sensors):,} sensors report.", advice)
         if missing or (names is not None and len(names) > len(sensors)):
             what = f"sensor {', '.join(missing)}" if missing else f"{len(names or ())} sensors"
             raise BadInput(
@@ -274,7 +279,7 @@ class VrpnTracker(OpenTracker):
         if self._trouble:
             self._tell("connected", "", f"{self._address.tracker} reports: {len(self._stations)} sensors")
         self._on_report(report, now_s)
-        if report.sensor not in self._strange:
+        if report.sensor not in self._strange and len(self._strange) < _MOST_SENSORS:
             self._strange.add(report.sensor)
             self._report("unexpected", f"sensor {report.sensor} reports now and is left out: it is no station")
         self._add_frames(self._reader.add(report, now_s), now_s)

@@ -165,6 +165,18 @@ def test_what_is_no_working_server_is_refused_in_one_line(sent: bytes, problem: 
     assert "\n" not in str(refused.value)
 
 
+def test_more_sensors_than_anyone_wears_are_refused() -> None:
+    place, turn = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+    reports = b"".join(PoseReport(n, n, place, turn).encode(1, 4).encode() for n in range(1001))
+
+    def script(connection: socket.socket) -> None:
+        connection.sendall(COOKIE + DESCRIPTIONS + reports)
+        wait_until_closed(connection)
+
+    with scripted_server(script) as port, pytest.raises(BadInput, match="1,001 sensors report"):
+        open_quick(port)
+
+
 def test_a_given_rate_stands_in_where_none_can_be_measured() -> None:
     def script(connection: socket.socket) -> None:
         connection.sendall(COOKIE + DESCRIPTIONS + POSES[:88])
