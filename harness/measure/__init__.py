@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
-    from harness.measure.angular_speed import coarse_offset, identify_stations, record_period_s
+    from harness.measure.angular_speed import coarse_offset, identify_stations
     from harness.measure.episode_distributions import events_for_precision
     from harness.measure.episodes import Episodes, find_excursions, find_gaps
     from harness.measure.gauss_markov import NOISE_KEYS, ErrorProcess
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         require_stamps,
     )
     from harness.measure.rigid_pair import RigidPair
+    from harness.measure.sampling import mean_period_s
     from harness.measure.timing import TIMING_KEYS
     from harness.measure.unit_file import CUT_ADVICE, UNIT_FILE, UnitFile, read_unit_file, write_unit_file
 else:
@@ -49,11 +50,11 @@ __all__ = [
     "find_excursions",
     "find_gaps",
     "identify_stations",
+    "mean_period_s",
     "measure_profile",
     "measure_spectrum",
     "pool_spectra",
     "read_unit_file",
-    "record_period_s",
     "register_poses",
     "require_stamps",
     "write_unit_file",

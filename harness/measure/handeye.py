@@ -11,12 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Floats, freeze
+from harness.core.arrays import Bools, Floats, freeze
 from harness.errors import NotComparable
 from harness.measure.registration_model import RegistrationState
 
 LEAST_TURN_RAD = 0.05
 """Least spread of the body's orientations about a second axis [rad]; a smaller one is motion about one axis."""
+
+MOST_MEDIANS = 3.0
+"""Pairs whose residual is larger than this many medians are left out of the trimmed solution [choice]."""
+MOST_TRIMS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +35,10 @@ class PosePairs:
     """(N, 3) position of the body, world [m]."""
     world_from_body: Floats
     """(N, 4) unit quaternions."""
+
+    def rows(self, chosen: Bools) -> "PosePairs":
+        """The pairs of a mask (N,)."""
+        return PosePairs(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
 
     def __post_init__(self) -> None:
         freeze(self, position_m=("N", 3))
@@ -48,6 +56,39 @@ def solve_hand_eye(stations: Sequence[PosePairs], *, with_scale: bool = True) ->
     room, mounts = _solve_rotations(stations)
     origin_m, scale, mount_m = _solve_positions(stations, room, with_scale)
     return RegistrationState(0.0, room, origin_m, scale, 0.0, 0.0, 0.0, 0.0, mounts, mount_m)
+
+
+def solve_trimmed(stations: Sequence[PosePairs], *, with_scale: bool = True) -> RegistrationState:
+    """As `solve_hand_eye`, of the pairs that agree: those far from the others are left out, again and again.
+
+    So a stream that lost its place for a part of its time is registered by the rest (least trimmed squares).
+    """
+    state, kept = solve_hand_eye(stations, with_scale=with_scale), list(stations)
+    for _ in range(MOST_TRIMS):
+        far = [_far_pairs(pairs, state, s) for s, pairs in enumerate(stations)]
+        chosen = [pairs.rows(~mask) for pairs, mask in zip(stations, far, strict=True)]
+        if all(len(a.position_m) == len(b.position_m) for a, b in zip(chosen, kept, strict=True)):
+            break
+        state, kept = solve_hand_eye(chosen, with_scale=with_scale), chosen
+    return state
+
+
+def pair_residuals(pairs: PosePairs, state: RegistrationState, station: int) -> tuple[Floats, Floats]:
+    """What a state leaves of pairs of one station: positions (N, 3) [m], rotation vectors (N, 3) [rad]."""
+    room = state.tracker_from_world
+    at_m = pairs.body_m + rotations.rotate(pairs.world_from_body, state.mount_m[station]) - state.tracker_origin_m
+    place = pairs.position_m - (1.0 + state.scale) * rotations.rotate(room, at_m)
+    modelled = rotations.multiply(rotations.multiply(room, pairs.world_from_body), state.body_from_station[station])
+    return place, rotations.log(rotations.multiply(pairs.tracker_from_station, rotations.inverse(modelled)))
+
+
+def _far_pairs(pairs: PosePairs, state: RegistrationState, station: int) -> Bools:
+    """(N,) whether the position or the orientation of a pair is far from the model, against the median."""
+    far = np.zeros(len(pairs.position_m), bool)
+    for values in pair_residuals(pairs, state, station):
+        length = np.linalg.norm(values, axis=1)
+        far |= length > MOST_MEDIANS * max(float(np.median(length)), 1e-9)
+    return far
 
 
 def require_two_axes(stations: Sequence[PosePairs]) -> None:

@@ -1,6 +1,6 @@
 """Registration of a capture with a reference: clocks, room, scale, heading error, and the mount of each station."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,8 +9,9 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
 from harness.core.number_format import CHI_QUANTILE, NORMAL_QUANTILE, Interval
 from harness.errors import BadInput, NotComparable
-from harness.measure.angular_speed import TimeOffset, coarse_offset, record_period_s
+from harness.measure.angular_speed import TimeOffset, coarse_offset
 from harness.measure.conventions import (
+    MOST_CLOCK_ERROR,
     MOST_PLACE_M,
     require_clock,
     require_orientations,
@@ -19,8 +20,9 @@ from harness.measure.conventions import (
     require_scale,
 )
 from harness.measure.gauss_markov import ErrorProcess
-from harness.measure.handeye import PosePairs, solve_hand_eye
+from harness.measure.handeye import PosePairs, solve_trimmed
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline, require_pairs
+from harness.measure.reference_noise import correct_for_reference
 from harness.measure.registration_fit import FittedRegistration, StationGrid, fit_registration
 from harness.measure.registration_model import (
     AHEAD,
@@ -34,11 +36,14 @@ from harness.measure.registration_model import (
     SHARED,
     RegistrationState,
 )
+from harness.measure.sampling import mean_period_s, own_places_s
 
 LEAST_OVERLAP_S = 10.0
 """Shortest common motion of capture and reference [s]."""
 LEAST_MATCHED = 0.95
 """Smallest share of the records due in the overlap that must have a pose, and the reference at their time."""
+FIXABLE = {"scale": SCALE, "heading": HEADING, "ahead": AHEAD, "clock": CLOCK}
+"""Values that a registration can keep at zero -> their places among the parameters."""
 LEAST_CORRELATION = 0.5
 """Smallest correlation of angular speeds with which motion counts as the reference's."""
 _OF_IT = "of it"
@@ -90,6 +95,8 @@ class MountFit:
 class StationResiduals:
     """What remains of N readings of a station after registration; a grid of its records in time."""
 
+    period_s: float
+    """Step of the grid [s]; more places than records where the records are uneven."""
     truth_s: Floats
     """(N,) time of the reference's clock, by the offset of orientation [s]."""
     position_m: Floats
@@ -127,6 +134,8 @@ class Registration:
     """
     mounts: Mapping[str, MountFit]
     errors: Mapping[str, StationResiduals]
+    explained: Mapping[str, tuple[float, float]]
+    """Station -> shares of the variance of its positions and orientations that the model explains, up to 1."""
     world_from_tracker: Floats
     """(4,) unit quaternion."""
     tracker_origin_m: Floats
@@ -171,19 +180,24 @@ def register_poses(
     pairs: Mapping[str, str] | None = None,
     least_overlap_s: float = LEAST_OVERLAP_S,
     least_matched: float = LEAST_MATCHED,
+    fixed: Collection[str] = (),
+    most_clock_error: float = MOST_CLOCK_ERROR,
+    truth_noise: Mapping[str, tuple[float, float]] | None = None,
 ) -> Registration:
     """Register stations with the reference motion of the bodies that carry them.
 
-    `pairs` names the body of each station; by default stations and bodies with the same name. BadInput without stamps,
-    for another motion, and for other axes or units of the reference. NotComparable for little overlap, few matched
-    records and motion about one axis; it names what is not observable.
+    `pairs` names the body of each station; by default stations and bodies with the same name. Values that `fixed`
+    names, of `FIXABLE`, stay zero: they are not fitted. `truth_noise` holds the standard deviations of the positions
+    [m] and rotations [rad] of bodies, which enter the intervals. BadInput without stamps, for another motion, and for
+    other axes or units of the reference. NotComparable for little overlap, few matched records and motion about one
+    axis; it names what is not observable.
     """
     named = dict(pairs) if pairs is not None else {name: name for name in stations if name in truths}
     require_pairs(stations, truths, named)
     splines = {station: TruthSpline(truths[body]) for station, body in named.items()}
     chosen = {station: stations[station] for station in named}
     require_stamps(chosen)
-    period_s = record_period_s(chosen)
+    period_s = mean_period_s([station.measured_s for station in chosen.values()])
     coarse = coarse_offset(chosen, splines, period_s, least_overlap_s)
     if not coarse.correlation >= LEAST_CORRELATION:
         raise BadInput(
@@ -192,18 +206,28 @@ def register_poses(
         )
     grids, matched, overlap_s, middle_s = _make_grids(chosen, splines, period_s, coarse, least_matched)
     start = _start(grids, list(splines.values()), coarse.offset_s, middle_s)
-    fit = fit_registration(list(grids.values()), list(splines.values()), start)
+    kept = [FIXABLE[name] for name in fixed]
+    fit = fit_registration(list(grids.values()), list(splines.values()), start, kept)
+    if truth_noise:
+        noise = [truth_noise.get(body, (0.0, 0.0)) for body in named.values()]
+        fit = correct_for_reference(fit, list(grids.values()), [truths[body] for body in named.values()], noise, kept)
     require_orientations([rest[grid.known, 3:] for rest, grid in zip(fit.residuals, grids.values(), strict=True)])
     factor = 1.0 + fit.state.scale
-    places_m = {name: rest[grid.known, :3] for rest, (name, grid) in zip(fit.residuals, grids.items(), strict=True)}
-    if max(np.nanstd(truths[body].position_m, axis=0).max() for body in named.values()) > MOST_PLACE_M:
+    places_m = {name: rest[used[:, 0], :3] for rest, used, name in zip(fit.residuals, fit.used, grids, strict=True)}
+    extent_m = max(_extent_m(truths[body].position_m) for body in named.values())
+    if extent_m > MOST_PLACE_M:
         known = np.sqrt(fit.covariance[HEADING, HEADING]) <= MOST_DEVIATION["rad"]
-        require_positions(places_m, factor, fit.state.heading_rad if known else 0.0)
+        require_positions(places_m, factor, fit.state.heading_rad if known else 0.0, extent_m)
     if np.sqrt(fit.covariance[SCALE, SCALE]) <= MOST_DEVIATION[_OF_IT] * abs(factor):
         require_scale(factor)  # first, because the limits below are in metres
     _require_observable(fit, list(named))
-    require_clock(fit.state.clock_ratio, float(np.sqrt(fit.covariance[CLOCK, CLOCK])))
+    require_clock(fit.state.clock_ratio, float(np.sqrt(fit.covariance[CLOCK, CLOCK])), most_clock_error)
     return _result(named, grids, fit, coarse.correlation, overlap_s, matched)
+
+
+def _extent_m(position_m: Floats) -> float:
+    """RMS distance of positions (N, 3) from their mean [m]; rows of NaN do not count."""
+    return float(np.sqrt(np.nansum(np.nanvar(position_m, axis=0))))
 
 
 def require_stamps(stations: Mapping[str, MeasuredPoses]) -> None:
@@ -230,8 +254,9 @@ def _make_grids(
         begins += [float(at_s.min()), float(splines[name].time_s[0])]
         ends += [float(at_s.max()), float(splines[name].time_s[-1])]
     begin_s, end_s = max(begins), min(ends)
+    step_s = own_places_s([station.measured_s[station.valid] for station in stations.values()], period_s)
     grids = {
-        name: _make_grid(station, splines[name], period_s, coarse.offset_s, begin_s, end_s)
+        name: _make_grid(station, splines[name], step_s, coarse.offset_s, begin_s, end_s)
         for name, station in stations.items()
     }
     due = len(grids) * max((end_s - begin_s) / period_s, 1.0)
@@ -272,7 +297,7 @@ def _start(
         body_m, body = spline.poses(grid.measured_s[grid.known] - offset_s)
         paired.append(PosePairs(grid.position_m[grid.known], grid.turn[grid.known], body_m, body))
     require_same_hand([one.position_m for one in paired], [one.body_m for one in paired])
-    return replace(solve_hand_eye(paired, with_scale=False), reference_s=middle_s, offset_s=offset_s)
+    return replace(solve_trimmed(paired, with_scale=False), reference_s=middle_s, offset_s=offset_s)
 
 
 def _require_observable(fit: FittedRegistration, stations: list[str]) -> None:
@@ -326,7 +351,7 @@ def _result(
             for axis in range(3)
         },
     }
-    mounts, errors = {}, {}
+    mounts, errors, explained = {}, {}, {}
     for s, (station, body) in enumerate(pairs.items()):
         own = slice(SHARED + OWN * s, SHARED + OWN * (s + 1))
         mounts[station] = MountFit(
@@ -335,13 +360,23 @@ def _result(
         grid, residual = grids[station], fit.residuals[s]
         truth_s = state.truth_time_s(grid.measured_s)
         errors[station] = StationResiduals(
-            truth_s, residual[:, :3], residual[:, 3:], grid.known, fit.used[s], fit.noise[s]
+            grid.period_s, truth_s, residual[:, :3], residual[:, 3:], grid.known, fit.used[s], fit.noise[s]
         )
+        explained[station] = _explained(grid, residual)
     room = slice(0, ROOM_ORIGIN.stop)
     return Registration(
-        values, mounts, errors, rotations.inverse(state.tracker_from_world), state.tracker_origin_m,
+        values, mounts, errors, explained, rotations.inverse(state.tracker_from_world), state.tracker_origin_m,
         covariance[room, room], state, correlation, overlap_s, matched, blocks,
     )  # fmt: skip
+
+
+def _explained(grid: StationGrid, residual: Floats) -> tuple[float, float]:
+    """Shares of the variance of positions and orientations that are not in residuals (N, 6)."""
+    place, turn, rest = grid.position_m[grid.known], grid.turn[grid.known], residual[grid.known]
+    middle = rotations.inverse(rotations.mean_rotation(turn))
+    parts = (place - place.mean(axis=0), rest[:, :3]), (rotations.log(rotations.multiply(turn, middle)), rest[:, 3:])
+    first, second = (1.0 - float(np.sum(left**2) / max(np.sum(total**2), 1e-300)) for total, left in parts)
+    return first, second
 
 
 def _vector(measured: Floats, nominal: Floats) -> Floats:

@@ -7,6 +7,7 @@ time longer than five correlation times scatter more than it says, it is enlarge
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -25,8 +26,14 @@ _AXES = ((0, 1, 2), (3, 4), (5,))
 """Axes of a reading with one noise: position, pitch and roll, yaw."""
 _CHI_MEDIAN = 1.538
 """Median length of a vector of three standard normal numbers."""
+_REFITS = 3
+"""Steps of generalised least squares, which is nearly linear."""
 _LONG_S, _AROUND_S = 0.4, 0.3
 """A run of outliers of this length is an excursion, whose ends are hidden in noise for this time [s]."""
+
+
+StationNoise: TypeAlias = tuple[ErrorProcess, ErrorProcess, ErrorProcess]
+"""Noise of position, pitch and roll, and yaw of a station."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +64,7 @@ class FittedRegistration:
     """(N, 6) for each station: position [m] and rotation vector [rad]."""
     used: tuple[Bools, ...]
     """(N, 2) for each station: whether position and orientation were used."""
-    noise: tuple[tuple[ErrorProcess, ErrorProcess, ErrorProcess], ...]
+    noise: tuple[StationNoise, ...]
     """Position, pitch and roll, and yaw of each station."""
 
 
@@ -67,15 +74,36 @@ def fit_registration(
     """Fit all parameters of S stations but those `fixed`, from a start within some degrees and tenths of a second."""
     state = _fit_loosely(grids, truths, start, fixed)
     for _ in range(2):
-        residuals = [_linear(state, s, grids, truths)[0] for s in range(len(grids))]
+        residuals = refit_residuals(state, grids, truths)
         used = [_agreeing(r, g) for r, g in zip(residuals, grids, strict=True)]
         noise = [_fit_noise(r, u, g.period_s) for r, u, g in zip(residuals, used, grids, strict=True)]
-        for _ in range(3):
+        for _ in range(_REFITS):
             step, information, meat, blocks = _whitened_step(state, grids, truths, used, noise, fixed)
             state = state.moved(step)
     covariance = _covariance(information, meat, blocks, fixed)
-    residuals = [_linear(state, s, grids, truths)[0] for s in range(len(grids))]
-    return FittedRegistration(state, covariance, blocks, tuple(residuals), tuple(used), tuple(noise))
+    residuals = refit_residuals(state, grids, truths)
+    return FittedRegistration(state, covariance, blocks, residuals, tuple(used), tuple(noise))
+
+
+def refit_residuals(
+    state: RegistrationState, grids: Sequence[StationGrid], truths: Sequence[TruthSpline]
+) -> tuple[Floats, ...]:
+    """(N, 6) residuals of each station under a state: position [m] and rotation vector [rad]."""
+    return tuple(_linear(state, s, grids, truths)[0] for s in range(len(grids)))
+
+
+def refit_steps(
+    fit: FittedRegistration,
+    grids: Sequence[StationGrid],
+    truths: Sequence[TruthSpline],
+    fixed: Sequence[int] = (),
+) -> Floats:
+    """Step (11 + 6 S,) from a fit to that with other references, by the readings and the noise of the fit."""
+    state, total = fit.state, np.zeros(SHARED + OWN * len(grids))
+    for _ in range(_REFITS):
+        step, *_ = _whitened_step(state, grids, truths, fit.used, fit.noise, fixed)
+        state, total = state.moved(step), total + step
+    return total
 
 
 def _linear(
@@ -144,7 +172,7 @@ def _joined(outlying: Bools, known: Bools) -> Bools:
     return out
 
 
-def _fit_noise(residual: Floats, used: Bools, period_s: float) -> tuple[ErrorProcess, ErrorProcess, ErrorProcess]:
+def _fit_noise(residual: Floats, used: Bools, period_s: float) -> StationNoise:
     place, tilt, yaw = (
         fit_process(np.ascontiguousarray(residual[:, list(axes)]), used[:, int(axes[0] >= 3)], period_s)
         for axes in _AXES
@@ -157,7 +185,7 @@ def _whitened_step(
     grids: Sequence[StationGrid],
     truths: Sequence[TruthSpline],
     used: Sequence[Bools],
-    noise: Sequence[tuple[ErrorProcess, ErrorProcess, ErrorProcess]],
+    noise: Sequence[StationNoise],
     fixed: Sequence[int],
 ) -> tuple[Floats, Floats, Floats, int]:
     """One step of generalised least squares, the information, its scatter over blocks, and their number."""

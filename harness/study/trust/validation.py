@@ -16,7 +16,6 @@ from harness.measure import (
     StationResiduals,
     UnitFile,
     identify_stations,
-    record_period_s,
     register_poses,
     require_stamps,
 )
@@ -91,12 +90,11 @@ def validate_capture(
         "heading_rad": registration.values["heading_rad"],
         "latency_s": _latency_s(readings, registration, truth),
     }
-    period_s = record_period_s(poses)
     accuracy = {}
     for station, errors in registration.errors.items():
         accuracy[station] = StationAccuracy(
-            error_quantiles(errors.position_m, errors.valid, period_s),
-            error_quantiles(errors.rotation_rad, errors.valid, period_s),
+            error_quantiles(errors.position_m, errors.valid, errors.period_s),
+            error_quantiles(errors.rotation_rad, errors.valid, errors.period_s),
             int(errors.valid.sum()),
             float(np.mean(readings[station].quality == 0.0)),
         )
