@@ -6,13 +6,16 @@ from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
     from harness.measure.angular_speed import coarse_offset, identify_stations
+    from harness.measure.conventions import MOST_CLOCK_ERROR
     from harness.measure.episode_distributions import events_for_precision
     from harness.measure.episodes import Episodes, find_excursions, find_gaps
     from harness.measure.gauss_markov import NOISE_KEYS, ErrorProcess
     from harness.measure.noise_spectra import ErrorSpectrum, measure_spectrum, pool_spectra
+    from harness.measure.pose_directions import find_directions, inverted_poses, inverted_truth
     from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
     from harness.measure.profile import QualityClass, StretchLength, UnitProfile, measure_profile
     from harness.measure.registration import (
+        LEAST_MATCHED,
         LEAST_OVERLAP_S,
         Registration,
         StationResiduals,
@@ -20,7 +23,7 @@ if TYPE_CHECKING:
         require_stamps,
     )
     from harness.measure.rigid_pair import RigidPair
-    from harness.measure.sampling import mean_period_s
+    from harness.measure.sampling import describe_sampling, mean_period_s
     from harness.measure.timing import TIMING_KEYS
     from harness.measure.unit_file import CUT_ADVICE, UNIT_FILE, UnitFile, read_unit_file, write_unit_file
 else:
@@ -28,7 +31,9 @@ else:
 
 __all__ = [
     "CUT_ADVICE",
+    "LEAST_MATCHED",
     "LEAST_OVERLAP_S",
+    "MOST_CLOCK_ERROR",
     "NOISE_KEYS",
     "TIMING_KEYS",
     "UNIT_FILE",
@@ -46,10 +51,14 @@ __all__ = [
     "UnitFile",
     "UnitProfile",
     "coarse_offset",
+    "describe_sampling",
     "events_for_precision",
+    "find_directions",
     "find_excursions",
     "find_gaps",
     "identify_stations",
+    "inverted_poses",
+    "inverted_truth",
     "mean_period_s",
     "measure_profile",
     "measure_spectrum",

@@ -39,3 +39,18 @@ def _own_share(times_s: Sequence[Floats], step_s: float) -> float:
         own += len(np.unique(np.rint((known - known[0]) / step_s))) if len(known) else 0
         total += len(known)
     return own / max(total, 1)
+
+
+def describe_sampling(name: str, time_s: Floats) -> str:
+    """A sentence on the rising times (N,) of a source [s]: period, range of its steps, and time without samples."""
+    if len(time_s) < 2:
+        return f"{name}: {len(time_s)} pose."
+    step_s, period_s = np.diff(time_s), mean_period_s([time_s])
+    low, high = np.quantile(step_s, [0.05, 0.95]).tolist()
+    evenness = "evenly" if own_places_s([time_s], period_s) == period_s else "unevenly"
+    lost_s = float(np.sum(step_s[step_s >= LOST_STEP * np.median(step_s)] - period_s))
+    lost = f", without {lost_s:.1f} of {time_s[-1] - time_s[0]:.1f} s" if lost_s > 0.0 else ""
+    return (
+        f"{name}: {len(time_s):,} poses, {evenness}, every {1e3 * period_s:.1f} ms in the mean "
+        f"(90 % of the steps: {1e3 * low:.0f} to {1e3 * high:.0f} ms){lost}."
+    )

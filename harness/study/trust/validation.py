@@ -11,11 +11,18 @@ from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
 from harness.experiment import Evaluation, evaluate_each, registered_take
 from harness.measure import (
+    LEAST_MATCHED,
+    LEAST_OVERLAP_S,
+    MOST_CLOCK_ERROR,
     MeasuredPoses,
     Registration,
     StationResiduals,
+    TruthPoses,
     UnitFile,
+    find_directions,
     identify_stations,
+    inverted_poses,
+    inverted_truth,
     register_poses,
     require_stamps,
 )
@@ -46,6 +53,21 @@ _MOST_LEFT_OUT = 0.15
 _NO_HOST_CLOCK = "reference not on the host's clock"
 
 
+_MOST_LOG_CLOCK_ERROR = 0.01
+"""Largest relative error between the clocks of two pose logs; a larger one is a wrong rate [choice]."""
+_NO_VERTICAL = "nothing says which axis of a pose log is vertical"
+
+
+@dataclass(frozen=True)
+class ValidationOptions:
+    """What a user allows and knows about a capture and its reference."""
+
+    least_matched: float = LEAST_MATCHED
+    """Smallest share of the records due that must have a reference."""
+    truth_noise: tuple[float, float] | None = None
+    """Standard deviations of the reference's positions [m] and rotations [rad] on each axis; None where unknown."""
+
+
 @dataclass(frozen=True, eq=False)
 class Validation:
     """What a reference shows of a capture."""
@@ -69,6 +91,7 @@ def validate_capture(
     truth: TruthMotion,
     *,
     expected: UnitFile | None = None,
+    options: ValidationOptions = ValidationOptions(),
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> Validation:
     """Register a capture with its reference and compare the result with the preset or an earlier unit file.
@@ -78,8 +101,19 @@ def validate_capture(
     readings, wire = capture.readings, capture.wire
     poses, unseen = _comparable_poses(capture, truth)
     progress("registration", 1, 3)
-    pairs, exchanged = _identify(poses, truth)
-    registration = register_poses(poses, truth.bodies, pairs=pairs)
+    bodies, directions = truth.bodies, ()
+    if wire is None and truth.is_log:
+        poses, bodies, directions = _same_direction(poses, truth)
+    pairs, exchanged = _identify(poses, replace(truth, bodies=bodies))
+    registration = register_poses(
+        poses,
+        bodies,
+        pairs=pairs,
+        least_matched=options.least_matched,
+        fixed=() if wire else ("heading",),
+        most_clock_error=MOST_CLOCK_ERROR if wire else _MOST_LOG_CLOCK_ERROR,
+        truth_noise=dict.fromkeys(bodies, options.truth_noise) if options.truth_noise else truth.noise,
+    )
     progress("accuracy", 2, 3)
     numbers = {
         "time_offset_orientation_s": registration.values["time_offset_orientation_s"],
@@ -87,7 +121,7 @@ def validate_capture(
         "components.speed.ahead_s": registration.values["position_ahead_s"],
         "components.clock.drift_ppm": registration.values["clock_ratio_ppm"],
         "scale": registration.values["scale"],
-        "heading_rad": registration.values["heading_rad"],
+        "heading_rad": registration.values["heading_rad"] if wire else Interval.missing(_NO_VERTICAL),
         "latency_s": _latency_s(readings, registration, truth),
     }
     accuracy = {}
@@ -99,12 +133,12 @@ def validate_capture(
             float(np.mean(readings[station].quality == 0.0)),
         )
     checks = _checks(numbers, registration, truth, pairs, expected, wire)
-    due = round(registration.overlap_s * wire.rate_hz)
+    due = round(registration.overlap_s * capture.rate_hz)
     progress("", 3, 3)
     report = ValidationReport(
         name=capture.path.stem,
         capture=CaptureSummary(
-            capture.path.name, capture.duration_s, wire.stations, wire.rate_hz, damage=capture.damage
+            capture.path.name, capture.duration_s, capture.stations, capture.rate_hz, damage=capture.damage
         ),
         truth=truth.title,
         matched_frames=round(registration.matched * due),
@@ -122,6 +156,9 @@ def validate_capture(
         notes=(
             *capture.left_out,
             *unseen,
+            *directions,
+            *_describe_clocks(capture, truth, registration),
+            *describe_explained(registration),
             *describe_left_out(registration.errors),
             *truth.notes,
             "Errors are those after the registration: constant errors of room and mounts are in its numbers.",
@@ -149,6 +186,35 @@ def _comparable_poses(capture: CaptureReadings, truth: TruthMotion) -> tuple[dic
     return seen, (f"{unseen}: no pose in the whole capture; left out.",) if unseen else ()
 
 
+def _same_direction(
+    poses: Mapping[str, MeasuredPoses], truth: TruthMotion
+) -> tuple[dict[str, MeasuredPoses], dict[str, TruthPoses], tuple[str, ...]]:
+    """Poses and bodies of two pose logs, inverted where one or both hold body-from-world poses, and why."""
+    pairs = {station: truth.body_of[station] for station in poses}
+    found = find_directions(poses, truth.bodies, pairs, LEAST_OVERLAP_S)
+    stations = {name: inverted_poses(one) if found.capture else one for name, one in poses.items()}
+    bodies = {name: inverted_truth(one) if found.truth else one for name, one in truth.bodies.items()}
+    return stations, bodies, (found.reason,) if found.reason else ()
+
+
+def _describe_clocks(capture: CaptureReadings, truth: TruthMotion, registration: Registration) -> tuple[str, ...]:
+    """The offset between Unix times, where both logs have them."""
+    start_s, other_s = capture.note.get("start_unix_s"), truth.start_unix_s
+    if start_s is None or other_s is None:
+        return ()
+    offset_s = registration.values["time_offset_orientation_s"].value + start_s - other_s
+    return (f"By their Unix times the capture is {1e3 * offset_s:,.1f} ms late, by orientation.",)
+
+
+def describe_explained(registration: Registration) -> tuple[str, ...]:
+    """A sentence for each station on the share of its motion that the registration explains."""
+    return tuple(
+        f"{station}: room, mount, scale and clocks explain {100.0 * place:.2f} % of the variance of the positions and "
+        f"{100.0 * turn:.2f} % of the orientations."
+        for station, (place, turn) in registration.explained.items()
+    )
+
+
 def describe_left_out(errors: Mapping[str, StationResiduals]) -> tuple[str, ...]:
     """A sentence for each station of which the registration left out more readings than a tracker's errors explain."""
     shares = {station: 1.0 - one.used[one.valid].mean(axis=0) for station, one in errors.items() if one.valid.any()}
@@ -173,14 +239,15 @@ def evaluate_registered(
     if playback is None:
         raise BadInput(f"{found.truth.title} has no performer.", "Methods are scored on a clip.")
     frames = RecordingStream(capture.path)
-    take = registered_take(frames, found.registration, playback, capture.wire.rate_hz, found.truth.loop_s)
+    take = registered_take(frames, found.registration, playback, capture.rate_hz, found.truth.loop_s)
     return evaluate_each(methods, take, metrics=SCORED_METRICS, progress=progress)
 
 
 def session_unit(found: Validation, base: UnitFile | None, name: str) -> UnitFile:
     """A unit file that also holds what the reference showed: speed error, and the session's scale and latency."""
     wire = found.capture.wire
-    start = base or UnitFile(name, preset_components(), {"rate_hz": wire.rate_hz, "items": list(wire.items)})
+    tracker = {"rate_hz": found.capture.rate_hz} | ({"items": list(wire.items)} if wire else {})
+    start = base or UnitFile(name, preset_components(), tracker)
     components = {key: dict(table) for key, table in start.components.items()}
     measured, not_measured = dict(start.measured), dict(start.not_measured)
     for key in ("components.speed.ahead_s", "components.clock.drift_ppm"):
@@ -228,12 +295,12 @@ def _checks(
     truth: TruthMotion,
     pairs: Mapping[str, str],
     expected: UnitFile | None,
-    wire: WireFormat,
+    wire: WireFormat | None,
 ) -> list[Departure]:
-    if truth.is_tracker:
+    if truth.is_tracker or (wire is None and expected is None):
         return []
     preset = preset_components()
-    record_s = record_size(wire.items) * BITS_PER_BYTE / _DEFAULT_BAUD
+    record_s = record_size(wire.items) * BITS_PER_BYTE / _DEFAULT_BAUD if wire else 0.0
     known = {
         "components.speed.ahead_s": preset_values()["components.speed.ahead_s"],
         "components.clock.drift_ppm": preset_values()["components.clock.drift_ppm"],
