@@ -1,22 +1,26 @@
 """The verb `validate`: compare a capture with a reference that was recorded beside it."""
 
 import argparse
+import math
 from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, split_list
+from harness.commands.flags import Verbs, add_verb, share, split_list
 from harness.commands.output import print_result, this_command
 from harness.commands.unit_results import UnitOptions, add_unit_flags, departure_content, read_expected, write_unit
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 
+_LEAST_MATCHED = 0.95
+
 
 def add_validate(verbs: Verbs) -> None:
     text = "register a capture with a reference, and measure errors, clocks, room and mounts against it"
     verb = add_verb(verbs, "validate", text, run_validate, "mocap")
-    verb.add_argument("capture", type=Path, help="a recording by `harness record` or `harness characterize`")
+    verb.add_argument("capture", type=Path, help="a recording, or a file of poses of another program")
     text = (
         "the reference: a clip of the capture's scenario or of a library, another capture, a C3D file with three or "
-        "more markers a station (head_1, head_2, head_3), a TUM file or folder with NAME.tum, or a CSV table"
+        "more markers a station (head_1, head_2, head_3), a TUM file or folder with NAME.tum, or a CSV table; beside a "
+        "file of poses also any other one"
     )
     verb.add_argument("--truth", required=True, metavar="CLIP|FILE", help=text)
     verb.add_argument(
@@ -25,31 +29,48 @@ def add_validate(verbs: Verbs) -> None:
     verb.add_argument(
         "--methods", metavar="A,B", help="clip: methods to reconstruct and score with what was registered"
     )
+    verb.add_argument("--stations", metavar="A,B", help="compare these stations only (default: all)")
+    text = f"smallest share of the records that must have a reference (default {_LEAST_MATCHED:g})"
+    verb.add_argument("--least-matched", type=share, default=_LEAST_MATCHED, metavar="SHARE", help=text)
+    text = "standard deviations of the reference's positions and orientations on each axis, which enter the intervals"
+    verb.add_argument("--truth-noise", type=_parse_noise, metavar="MM,DEG", help=text)
     text = "unit file to write: that of --expect, or the preset, with what the reference showed; the page is beside it"
     add_unit_flags(verb, text)
+
+
+def _parse_noise(text: str) -> tuple[float, float]:
+    """Millimetres and degrees as metres and radians."""
+    try:
+        place_mm, turn_deg = (float(word) for word in text.split(","))
+    except ValueError:
+        place_mm = turn_deg = math.nan
+    if not (0.0 <= place_mm < math.inf and 0.0 <= turn_deg < math.inf):
+        raise argparse.ArgumentTypeError(f"{text!r} is no pair of millimetres and degrees, such as 0.2,0.1")
+    return 1e-3 * place_mm, math.radians(turn_deg)
 
 
 def run_validate(args: argparse.Namespace) -> Outcome:
     from harness.report.kit import render_text
     from harness.report.lab.validation_page import validation_page
-    from harness.stream.recording import CaptureReader
-    from harness.study.trust.capture_readings import read_capture
+    from harness.study.trust.logged_poses import read_source
     from harness.study.trust.truth_source import TruthSource, load_truth
-    from harness.study.trust.validation import evaluate_registered, session_unit, validate_capture
+    from harness.study.trust.validation import ValidationOptions, evaluate_registered, session_unit, validate_capture
 
     options = UnitOptions(args.out, args.expect, args.force)
     source = TruthSource(args.truth, args.scenario, args.mocap)
     methods = split_list(args.methods)
     expected = read_expected(options)
-    reader = CaptureReader(args.capture)
     with ProgressBar("steps") as progress:
         progress("reading", 0, 3)
-        capture = read_capture(reader)
+        capture = read_source(args.capture)
+        if args.stations:
+            capture = capture.only(split_list(args.stations))
         truth = load_truth(capture, source)
         if methods and truth.playback is None:
             advice = "Only a clip has a performer's body to score on: leave it out."
             raise BadInput(f"--methods with {truth.title}.", advice)
-        found = validate_capture(capture, truth, expected=expected, progress=progress)
+        limits = ValidationOptions(args.least_matched, args.truth_noise)
+        found = validate_capture(capture, truth, expected=expected, options=limits, progress=progress)
         scores = evaluate_registered(found, methods, progress) if methods else []
     report = found.report
     errors = {one.method: {metric: one.metrics[metric] for metric in one.names} for one in scores}
@@ -59,6 +80,10 @@ def run_validate(args: argparse.Namespace) -> Outcome:
         "truth": truth.title,
         "matched_share": report.matched_share,
         "numbers": {key: number.as_dict() for key, number in report.numbers.items()},
+        "explained": {
+            station: {"position": place, "orientation": turn}
+            for station, (place, turn) in found.registration.explained.items()
+        },
         "exchanged": dict(found.exchanged),
         "departures": departure_content(found.named, "p_holm"),
         "scores": [

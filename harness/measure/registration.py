@@ -44,7 +44,7 @@ LEAST_MATCHED = 0.95
 """Smallest share of the records due in the overlap that must have a pose, and the reference at their time."""
 FIXABLE = {"scale": SCALE, "heading": HEADING, "ahead": AHEAD, "clock": CLOCK}
 """Values that a registration can keep at zero -> their places among the parameters."""
-LEAST_CORRELATION = 0.5
+LEAST_CORRELATION = 0.65
 """Smallest correlation of angular speeds with which motion counts as the reference's."""
 _OF_IT = "of it"
 MOST_DEVIATION = {"m": 0.05, "rad": float(np.deg2rad(10.0)), "s": 0.05, _OF_IT: 0.1}

@@ -6,11 +6,26 @@ from pathlib import Path
 import numpy as np
 
 from harness.core import rotations
+from harness.core.file_kind import file_kind
 from harness.measure import TruthPoses, describe_sampling
 from harness.stream import BodyPoses, PoseLog
-from harness.stream.recording import StationReadings
-from harness.study.trust.capture_readings import CaptureReadings
+from harness.stream.poses.options import PoseFileOptions
+from harness.stream.poses.pose_file import read_pose_log
+from harness.stream.recording import CaptureReader, StationReadings
+from harness.study.trust.capture_readings import CaptureReadings, read_capture
 from harness.study.trust.truth_motion import TruthMotion
+
+
+def read_source(path: Path, options: PoseFileOptions | None = None) -> CaptureReadings:
+    """The readings of a recording, or of a file of poses."""
+    if is_recording(path):
+        return read_capture(CaptureReader(path))
+    return readings_of_log(path, read_pose_log(path, options))
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a file is a recording of the harness, damaged or not; all others are files of poses."""
+    return path.suffix == ".rec" or file_kind(path) == "a recording"
 
 
 def readings_of_log(path: Path, log: PoseLog) -> CaptureReadings:
