@@ -32,7 +32,7 @@ _PORT_FLAGS = ("stations", "rate", "minutes", "yes", *LINE_FLAGS)
 def add_characterize(verbs: Verbs) -> None:
     text = "measure the errors, clock and line of a device at rest, and write them as a unit file for scenarios"
     verb = add_verb(verbs, "characterize", text, run_characterize)
-    verb.add_argument("source", help="a recording, or a port as for `harness record`: a guided capture is then made")
+    verb.add_argument("source", help="a recording, a file of poses, or a port: a guided capture is then made")
     add_unit_flags(verb, "unit file to write; the page is written beside it")
     text = "two stations on one bar: they show errors in motion without a reference"
     verb.add_argument("--rigid", metavar="A,B", help=text)
@@ -46,14 +46,19 @@ def add_characterize(verbs: Verbs) -> None:
 def run_characterize(args: argparse.Namespace) -> Outcome:
     from harness.report.kit import render_text
     from harness.report.lab.unit_page import unit_page
+    from harness.stream.poses.pose_file import read_pose_log
     from harness.stream.recording import CaptureReader
-    from harness.study.trust.characterization import characterize_capture
+    from harness.study.trust.characterization import characterize_capture, characterize_log
+    from harness.study.trust.logged_poses import is_recording
 
     options = UnitOptions(args.out, args.expect, args.force)
     expected, pair = read_expected(options), _parse_pair(args.rigid)
-    reader = CaptureReader(_capture_of(args))
+    path = _capture_of(args)
     with ProgressBar("parts") as progress:
-        found = characterize_capture(reader, expected=expected, rigid=pair, progress=progress)
+        if is_recording(path):
+            found = characterize_capture(CaptureReader(path), expected=expected, rigid=pair, progress=progress)
+        else:
+            found = characterize_log(path, read_pose_log(path), expected=expected, rigid=pair, progress=progress)
     page = unit_page(found.report, this_command(), options.out.name if options.out else "")
     lines, written = write_unit(options, found.unit, page)
     content = {
@@ -62,6 +67,7 @@ def run_characterize(args: argparse.Namespace) -> Outcome:
         "timing": {key: number.as_dict() for key, number in found.profile.timing.all_stations.items()},
         "departures": departure_content(found.named, "p", "p_holm"),
         "damage": list(found.profile.damage),
+        "notes": list(found.profile.limits),
         **written,
     }
     return print_result(args, content, render_text(page), *lines)

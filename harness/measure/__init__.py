@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from harness.measure.episode_distributions import events_for_precision
     from harness.measure.episodes import Episodes, find_excursions, find_gaps
     from harness.measure.gauss_markov import NOISE_KEYS, ErrorProcess
+    from harness.measure.log_profile import measure_log_profile
     from harness.measure.noise_spectra import ErrorSpectrum, measure_spectrum, pool_spectra
     from harness.measure.pose_directions import find_directions, inverted_poses, inverted_truth
     from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
@@ -60,6 +61,7 @@ __all__ = [
     "inverted_poses",
     "inverted_truth",
     "mean_period_s",
+    "measure_log_profile",
     "measure_profile",
     "measure_spectrum",
     "pool_spectra",

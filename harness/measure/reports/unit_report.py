@@ -258,8 +258,8 @@ def make_unit_report(
         stations=tuple(StationFigures(station, _figures(profile, station)) for station in profile.stations),
         allan_position=_allan(profile.episodes.found, "position_m"),
         allan_orientation=_allan(profile.episodes.found, "rotation_rad"),
-        allan_position_model=_allan_model(profile.noise.all_stations, profile.rate_hz, 0, (1, 1, 1)),
-        allan_orientation_model=_allan_model(profile.noise.all_stations, profile.rate_hz, 2, (3, 3, 4)),
+        allan_position_model=_allan_model(profile.noise.all_stations, profile.even_rate_hz, 0, (1, 1, 1)),
+        allan_orientation_model=_allan_model(profile.noise.all_stations, profile.even_rate_hz, 2, (3, 3, 4)),
         spectra=_spectra(profile.rest),
         episodes=_episodes(profile),
         quality=profile.quality,
@@ -341,7 +341,7 @@ def _allan_model(
 def _episodes(profile: UnitProfile) -> tuple[EpisodeMark, ...]:
     """All episodes at rest, by the time since the first rest began."""
     marks = []
-    begin_s = min(one.begin_s for one in profile.rest)
+    begin_s = min((one.begin_s for one in profile.rest), default=0.0)
     for one in profile.episodes.found:
         since_s, rate_hz, station = one.series.begin_s - begin_s, one.series.rate_hz, one.series.station
         for event in one.excursions:

@@ -49,13 +49,15 @@ def unit_page(report: UnitReport, command: str, unit_file: str = "") -> Page:
     return Page(
         verb="characterize",
         name=report.name,
-        headline=departures_sentence(report.name, report.checks, report.expected_from),
+        headline=departures_sentence(report.name, report.checks, report.expected_from)
+        if report.expected_from
+        else f"{capture_text(report.capture)}.",
         lead=[Bullets(departure_texts(report.checks)), *([Prose(described)] if described else [])],
         facts={
             "Capture": capture_text(report.capture),
             "Damage": " ".join(report.capture.damage),
             "Unit file": unit_file,
-            "Expected": f"numbers of {report.expected_from}",
+            "Expected": f"numbers of {report.expected_from}" if report.expected_from else "",
         },
         sections=[
             Section(

@@ -15,10 +15,11 @@ from harness.core.fields import replace_fields
 from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
-from harness.measure import UnitFile, UnitProfile, measure_profile
+from harness.measure import UnitFile, UnitProfile, measure_log_profile, measure_profile
 from harness.measure.reports import Departure, UnitReport, compare_with_expected, make_unit_report
 from harness.results.files import file_digest
 from harness.simulate import noise_preset
+from harness.stream import PoseLog
 from harness.stream.recording import EXPECTED_FILE, CaptureReader
 
 UNIFORM_KEYS = (
@@ -156,7 +157,7 @@ class Characterization:
     @property
     def report(self) -> UnitReport:
         """All that the unit's page shows."""
-        defaults = {key: number.value for key, number in preset_values().items()}
+        defaults = {key: number.value for key, number in preset_values().items()} if self.profile.items else {}
         return make_unit_report(self.profile, self.unit, self.checks, self.expected_from, defaults)
 
 
@@ -172,10 +173,28 @@ def characterize_capture(
     The unit has the name of the capture. BadFile and BadInput as `measure.profile.measure_profile`.
     """
     profile = measure_profile(reader, rigid=rigid, progress=progress)
-    unit = make_unit_file(profile, reader.path)
     known = preset_values() if expected is None else unit_values(expected)
+    return _compare(profile, reader.path, known, expected.name if expected else "the preset default")
+
+
+def characterize_log(
+    path: Path,
+    log: PoseLog,
+    *,
+    expected: UnitFile | None = None,
+    rigid: tuple[str, str] | None = None,
+    progress: ProgressCallback = lambda step, done, planned: None,
+) -> Characterization:
+    """Measure the source of a pose log, and compare it with an earlier unit file; it is compared with no preset."""
+    profile = measure_log_profile(log, rigid=rigid, progress=progress)
+    known = {} if expected is None else unit_values(expected)
+    return _compare(profile, path, known, expected.name if expected else "")
+
+
+def _compare(profile: UnitProfile, path: Path, known: Mapping[str, Interval], name: str) -> Characterization:
+    unit = make_unit_file(profile, path)
     checks = check_departures(measured_numbers(profile), expected_numbers(profile, known))
-    return Characterization(profile, unit, tuple(checks), expected.name if expected else "the preset default")
+    return Characterization(profile, unit, tuple(checks), name)
 
 
 def make_unit_file(profile: UnitProfile, path: Path) -> UnitFile:
@@ -188,9 +207,9 @@ def make_unit_file(profile: UnitProfile, path: Path) -> UnitFile:
     return UnitFile(
         path.stem,
         nest_components(_in_order(values), components),
-        {"rate_hz": profile.rate_hz, "items": list(profile.items)},
+        {"rate_hz": profile.rate_hz} | ({"items": list(profile.items)} if profile.items else {}),
         {key: number for key, number in {**measured, **_means(profile)}.items() if number.is_measured},
-        {**reasons, **{key: reason for key, reason in DEFAULT_KEPT.items() if key in defaults}},
+        {**reasons, **{key: reason for key, reason in DEFAULT_KEPT.items() if key in defaults and profile.items}},
         capture=_describe_capture(profile, path),
     )
 
@@ -207,7 +226,9 @@ def measured_numbers(profile: UnitProfile) -> dict[tuple[str, str], Interval]:
 
 
 def expected_numbers(profile: UnitProfile, known: Mapping[str, Interval]) -> dict[tuple[str, str], Interval]:
-    """What is expected of the measured numbers: the known ones, and of the line that no record is lost or repeated."""
+    """What is expected of the measured numbers: the known ones, and of a line that no record is lost or repeated."""
+    if not profile.items:  # a file of poses came over no line
+        return {(key, ""): number for key, number in known.items()}
     line = dict.fromkeys(("timing.lost_share", "timing.duplicate_share", "timing.clock_age_s"), 0.0)
     resolution = profile.timing.all_stations["timing.stamp_resolution_s"]
     if resolution.value > 2.0 * profile.timing.expected_resolution_s:  # else it is as fine as the format allows
