@@ -26,7 +26,7 @@ BAR = ("one", "two")
 def _without_noise(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whose fit takes seconds and has tests of its own."""
     noise = NoiseFit(dict.fromkeys(NOISE_KEYS, Interval.missing("not fitted")), {})
-    monkeypatch.setattr("harness.measure.profile._fit", lambda rest, progress: (noise, SimpleNamespace(found=())))
+    monkeypatch.setattr("harness.measure.profile.fit_rest", lambda rest, progress: (noise, SimpleNamespace(found=())))
 
 
 def profile(*blocks: CaptureBlock) -> UnitProfile:
