@@ -1,4 +1,4 @@
-"""The verb `replay`: play a recording into the decoder, and into methods."""
+"""The verb `replay`: play a recording or poses as frames, and a recording into methods."""
 
 import argparse
 import json
@@ -8,21 +8,28 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.flags import Verbs, add_verb, parse_methods, parse_names, repeat_flags
+from harness.commands.flags import Verbs, add_verb, parse_methods, parse_names, refuse_flags, repeat_flags
 from harness.commands.output import print_caveat, print_data, print_result, print_status
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
 from harness.core.number_format import format_fixed
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
 
 if TYPE_CHECKING:
     from harness.experiment import Evaluation, ObservedTake
-    from harness.stream.recording import Recording, RecordingStream
+    from harness.stream import StreamSummary
+    from harness.stream.recording import PoseLogStream, Recording, RecordingStream
+
+_SCORING = ("methods", "scenario", "stations", "clip", "noise", "seed", "calibration")
+"""Flags that ask for methods; with a recording --rate too."""
+_POSE_FLAGS = tuple(name for name in POSE_FLAGS if name != "rate")
 
 
 def add_replay(verbs: Verbs) -> None:
-    text = "play a recording into the decoder; with --methods, into methods, scored against the known motion"
+    text = "play a recording into the decoder, or poses; with --methods, into methods, scored against the known motion"
     verb = add_verb(verbs, "replay", text, run_replay, "seed", "mocap")
-    verb.add_argument("file", type=Path, help="recording written by `harness record`")
+    text = "recording written by `harness record`, or poses of another program (TUM, EuRoC, CSV, matrices)"
+    verb.add_argument("file", type=Path, help=text)
     text = "max (default), step (one frame per Enter), or a factor of the recorded speed, such as 1 or 0.5"
     verb.add_argument("--speed", default="max", metavar="SPEED", help=text)
     text = "print every station of every frame, as CSV or as JSON lines"
@@ -39,19 +46,22 @@ def add_replay(verbs: Verbs) -> None:
     verb.add_argument("--rate", type=float, metavar="HZ", help=text)
     text = "calibration of mounts, room and body for the methods, written by `harness calibrate` (default: the truth)"
     verb.add_argument("--calibration", type=Path, metavar="FILE", help=text)
+    add_pose_flags(verb, shared=("rate",))
 
 
 def run_replay(args: argparse.Namespace) -> Outcome:
     from harness.stream.recording import RecordingStream, parse_speed, read_recording
 
+    if holds_poses(args.file):
+        return _replay_poses(args)
+    refuse_flags(args, _POSE_FLAGS, f"with {args.file.name}", "It is for poses of another program: leave it out.")
     speed, recording = parse_speed(args.speed), read_recording(args.file)
     if recording.answers and not recording.formats:
         return _print_answers(args, recording)
     stream = RecordingStream(recording, speed)
     for lost in stream.recording.damage:
         print(f"lost: {lost}", file=sys.stderr)
-    scoring = ("methods", "scenario", "stations", "clip", "noise", "rate", "seed", "calibration")
-    if any(getattr(args, name) is not None for name in scoring):
+    if any(getattr(args, name) is not None for name in (*_SCORING, "rate")):
         return _score_methods(args, stream)
     return _print_frames(args, stream)
 
@@ -64,9 +74,30 @@ def _print_answers(args: argparse.Namespace, recording: "Recording") -> Outcome:
     return print_result(args, content, *format_exchanges(recording.answers))
 
 
-def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
+def _replay_poses(args: argparse.Namespace) -> Outcome:
+    """Play poses of another program: frames alone, because nothing tells the body that carried them."""
+    from harness.stream.recording import PoseLogStream, parse_speed
+
+    advice = "Poses of another program name no performer, mounts or motion: leave it out."
+    refuse_flags(args, _SCORING, f"with the poses of {args.file.name}", advice)
+    found = read_poses([args.file], pose_options(args))
+    for lost in found.damage:
+        print(f"lost: {lost}", file=sys.stderr)
+    stream = PoseLogStream(found.log, parse_speed(args.speed))
+    if (summary := _play(args, stream)) is None:
+        return Outcome.PASS
+    findings = [str(finding) for finding in found.log.findings]
+    content = {**summary.as_dict(), "lost": list(found.damage), "findings": findings}
+    if args.frames and not args.json:  # the frames are the data
+        print(summary, file=sys.stderr)
+        return Outcome.PASS
+    following = ["inspect", args.file, *repeat_flags(args, *POSE_FLAGS)]
+    return print_result(args, content, str(summary), "", *findings, following=following)
+
+
+def _play(args: argparse.Namespace, stream: "RecordingStream | PoseLogStream") -> "StreamSummary | None":
+    """Play a stream, and print its frames with --frames; None when the reader of stdout has left."""
     from harness.stream import FRAME_COLUMNS, StreamSummary, format_csv_row, frame_rows
-    from harness.stream.recording import format_exchanges
 
     summary = StreamSummary(stream.stations)
     if args.frames and not args.json:
@@ -77,7 +108,15 @@ def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcom
             rows = frame_rows(frame, stream.stations, stream.wall_s(frame.received_s))
             texts = [json.dumps(row) if args.json else format_csv_row(row) for row in rows]
             if not print_data("".join(f"{text}\n" for text in texts)):
-                return Outcome.PASS
+                return None
+    return summary
+
+
+def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
+    from harness.stream.recording import format_exchanges
+
+    if (summary := _play(args, stream)) is None:
+        return Outcome.PASS
     recording = stream.recording
     content = {**summary.as_dict(), **stream.counts, "lost": recording.damage, "events": recording.events}
     content |= {"answers": recording.answers}

@@ -9,7 +9,10 @@ if TYPE_CHECKING:
     from harness.stream.host_clock import HostClockEstimator
     from harness.stream.inputs import INPUT_COMBINATIONS, make_inputs
     from harness.stream.line_events import EventCounter, LineEvent
+    from harness.stream.poses.options import QUATERNION_ORDERS, UP_AXES, PoseFileOptions
+    from harness.stream.poses.pose_file import UnknownRate
     from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
+    from harness.stream.poses.pose_statistics import measure_sampling
     from harness.stream.station_counts import FRAME_COLUMNS, StationCounts, StreamSummary, format_csv_row, frame_rows
 else:
     __getattr__, __dir__ = lazy_names(__name__)
@@ -17,18 +20,23 @@ else:
 __all__ = [
     "FRAME_COLUMNS",
     "INPUT_COMBINATIONS",
+    "QUATERNION_ORDERS",
+    "UP_AXES",
     "BodyPoses",
     "EventCounter",
     "FileFinding",
     "HostClockEstimator",
     "LineEvent",
+    "PoseFileOptions",
     "PoseLog",
     "StationCounts",
     "StreamSummary",
     "TrackerFrame",
     "TrackerStream",
+    "UnknownRate",
     "format_csv_row",
     "frame_rows",
     "make_inputs",
+    "measure_sampling",
     "split_frames",
 ]

@@ -216,6 +216,8 @@ def _from_numbers(head: TableHead) -> TableColumns:
                 found = tuple(BodyColumns("", tuple(s[position]), tuple(s[quaternion])) for s in starts)
                 return _without_names(head, number[:before], found)
     what = f"no four columns of norm 1 where a quaternion may stand, in {head.form}"
+    if len(number) < 7:
+        what = f"rows of {len(number)} numbers, where a pose has 7, or 12 in a matrix"
     raise BadFile(head.path, what, EXPECTED_COLUMNS, _ADVICE)
 
 

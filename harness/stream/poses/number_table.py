@@ -97,7 +97,7 @@ def read_head(path: Path) -> TableHead:
     header: list[tuple[str, ...]] = []
     rows: list[list[float]] = []
     first_line = 0
-    if len(texts) < columns <= MOST_COLUMNS:
+    if _count_numbers(last, separator, decimal) >= 2 and columns <= MOST_COLUMNS:
         for number, line in numbered:
             row = None if _COMMENT.match(line) else _parse_row(_split(line, separator), columns, texts, decimal)
             if row is not None and (rows or np.isfinite(row).sum() >= min(2, columns - len(texts))):

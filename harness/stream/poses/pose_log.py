@@ -3,7 +3,8 @@
 A pose log has no period and no even rate: samples come when the source wrote them. It has a clock of its own.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -89,3 +90,11 @@ class PoseLog:
             if body.name == name:
                 return body
         raise UnknownName("body", name, self.names)
+
+    def select(self, names: Sequence[str]) -> "PoseLog":
+        """The log of some bodies, whose first pose is at time 0. Raises UnknownName."""
+        bodies = [self.body(name) for name in names]
+        begin_s = min(float(body.times_s[0]) for body in bodies)
+        shifted = tuple(replace(body, times_s=body.times_s - begin_s) for body in bodies)
+        start_s = None if self.start_unix_s is None else self.start_unix_s + begin_s
+        return replace(self, bodies=shifted, start_unix_s=start_s)

@@ -17,6 +17,13 @@ if TYPE_CHECKING:
     from harness.stream.recording.command_recording import check_commands, format_exchanges, record_commands
     from harness.stream.recording.guided_capture import Stretch, capture_stretches, finished_stretches
     from harness.stream.recording.line_server import serve_line
+    from harness.stream.recording.pose_recording import (
+        PoseRecording,
+        is_pose_file,
+        open_poses,
+        write_pose_recording,
+    )
+    from harness.stream.recording.pose_replay import PoseLogStream
     from harness.stream.recording.recorder import RecordingSwitch, record_port
     from harness.stream.recording.recording import (
         EXPECTED_FILE,
@@ -40,6 +47,8 @@ __all__ = [
     "RECEIVED",
     "CaptureBlock",
     "CaptureReader",
+    "PoseLogStream",
+    "PoseRecording",
     "Recording",
     "RecordingBlock",
     "RecordingStream",
@@ -52,6 +61,8 @@ __all__ = [
     "encode_block",
     "finished_stretches",
     "format_exchanges",
+    "is_pose_file",
+    "open_poses",
     "parse_speed",
     "read_blocks",
     "read_recording",
@@ -59,4 +70,5 @@ __all__ = [
     "record_commands",
     "record_port",
     "serve_line",
+    "write_pose_recording",
 ]

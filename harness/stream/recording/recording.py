@@ -11,6 +11,7 @@ costs only the blocks it touches, and these are reported. A recording that was c
     answ         JSON of a command that a person sent, with the bytes and the decoded values of its answer
     mark         JSON of the stretch of a capture that begins here and lasts to the next mark, such as
                  {"stretch": "static"}; the stretch "" ends one
+    body, pose   poses of another program in place of bytes (`pose_recording.py`), in files of version 2
 """
 
 import json
@@ -49,6 +50,7 @@ from harness.stream.recording.blocks import (
     MARK,
     MAX_PAYLOAD_BYTES,
     NOTE,
+    POSES_VERSION,
     RECEIVED,
     SENT,
     VERSION,
@@ -237,6 +239,9 @@ def describe_damage(entries: Iterable[RecordingBlock | DamagedSpan], damage: lis
 def _check_kind(path: Path, data: bytes) -> None:
     """Raise BadFile unless the file is a recording or the beginning of one."""
     version = read_version(data)
+    if version == POSES_VERSION:
+        expected = "a recording of a device's line"
+        raise BadFile(path, "a recording of poses", expected, "`harness inspect`, `replay` and `view` read it.")
     if version is not None and version > VERSION:
         problem = f"a recording of version {version}"
         raise BadFile(path, problem, f"version {VERSION} at most", "Use the newer version of the harness that made it.")

@@ -63,7 +63,7 @@ def truth_of_markers(path: Path, markers: MarkerClip, stations: Sequence[str]) -
     time_s = np.arange(len(markers)) / markers.rate_hz
     bodies, notes = {}, []
     for station in stations:
-        rows = [row for row, label in enumerate(markers.labels) if _is_marker_of(label, station)]
+        rows = [row for row, label in enumerate(markers.labels) if body_of_label(label) == station.lower()]
         if len(rows) < FEWEST_MARKERS:
             found = f"{len(rows)} marker(s) of station {station!r} among {', '.join(markers.labels[:12])}"
             raise BadFile(path, found, "three or more", f"Label them {station}_1, {station}_2, {station}_3.")
@@ -214,5 +214,6 @@ def _poses(path: Path, time_s: Floats, position_m: Floats, quaternion: Floats) -
     return TruthPoses(unique_s, poses[rows, :3], poses[rows, 3:])
 
 
-def _is_marker_of(label: str, station: str) -> bool:
-    return _LABEL_END.sub("", label.strip()).lower() == station.lower()
+def body_of_label(label: str) -> str:
+    """The name of the body that a marker's label names, in small letters: "head" of `HEAD-A`."""
+    return _LABEL_END.sub("", label.strip()).lower()

@@ -1,0 +1,63 @@
+"""Flags of verbs that read poses of other programs, and the reading."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from harness.commands.flags import split_list
+from harness.core.units import TIME_UNITS_S, parse_length_unit
+from harness.errors import BadInput
+
+if TYPE_CHECKING:
+    from harness.stream import PoseFileOptions
+    from harness.stream.recording import PoseRecording
+
+POSE_FLAGS = ("columns", "unit", "quaternion", "up", "time_unit", "rate")
+"""Flags of `add_pose_flags`, as attributes of the parsed command line."""
+MARKER_SUFFIX = ".c3d"
+
+
+def add_pose_flags(verb: argparse.ArgumentParser, *, shared: Sequence[str] = ()) -> None:
+    """Add the flags by which a user overrides what a file of poses shows; `shared` ones the verb has already."""
+    poses = verb.add_argument_group("of poses of other programs (TUM, EuRoC, CSV, matrices), in place of the evidence")
+    text = "names of the columns in their order, such as time,x,y,z,qx,qy,qz,qw; - for others"
+    poses.add_argument("--columns", metavar="A,B", help=text)
+    poses.add_argument("--quaternion", metavar="ORDER", help="order of a quaternion: xyzw or wxyz")
+    poses.add_argument("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y or -z (write --up=-y)")
+    poses.add_argument("--time-unit", metavar="U", help=f"unit of times: {', '.join(TIME_UNITS_S)}")
+    if "unit" not in shared:
+        text = "unit of length: mm, cm, m, in, ft, or metres per unit"
+        poses.add_argument("--unit", metavar="M", type=parse_length_unit, help=text)
+    if "rate" not in shared:
+        poses.add_argument("--rate", metavar="HZ", type=float, help="samples per second of a file without times")
+
+
+def pose_options(args: argparse.Namespace) -> "PoseFileOptions":
+    """What the flags say. Raises BadInput."""
+    from harness.stream import PoseFileOptions
+
+    columns = split_list(args.columns)
+    return PoseFileOptions(
+        tuple(columns) if columns else None, args.unit, args.quaternion, args.up, args.time_unit, args.rate
+    )
+
+
+def holds_poses(path: Path) -> bool:
+    """Whether a file holds poses: a recording of them, a text that no other verb reads, or markers."""
+    from harness.stream.recording import is_pose_file
+
+    return is_pose_file(path) or (path.suffix.lower() == MARKER_SUFFIX and path.is_file())
+
+
+def read_poses(paths: Sequence[Path], options: "PoseFileOptions") -> "PoseRecording":
+    """Read a recording of poses, files of other programs, or clusters of markers. Raises BadFile or BadInput."""
+    from harness.stream.recording import PoseRecording, open_poses
+
+    if not any(path.suffix.lower() == MARKER_SUFFIX for path in paths):
+        return open_poses(paths, options)
+    if len(paths) > 1:
+        raise BadInput(f"{len(paths)} files with markers among them.", "Name one C3D file alone.")
+    from harness.study.trust.marker_poses import read_marker_poses
+
+    return PoseRecording(paths[0], read_marker_poses(paths[0], options.unit_m), {})
