@@ -16,6 +16,7 @@ from harness.commands.flags import (
     refuse_flags,
 )
 from harness.commands.output import print_result, print_status, recording_note, show_progress, this_command
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
 from harness.commands.unit_results import UnitOptions, add_unit_flags, departure_content, read_expected, write_unit
 from harness.core.package_data import VERSION
 from harness.core.progress import ProgressBar
@@ -26,7 +27,9 @@ if TYPE_CHECKING:
 
 _DEFAULT_STATIC_MIN, _SWEEP_S, _COVERED_S = 17.0, 30.0, 20.0
 """Minutes at rest, in which six stations show a rate of one event a minute to 20 %; seconds of the other stretches."""
-_PORT_FLAGS = ("stations", "rate", "minutes", "yes", *LINE_FLAGS)
+_PORT_ALONE = ("stations", "minutes", "yes", *LINE_FLAGS)
+_PORT_FLAGS = (*_PORT_ALONE, "rate")
+_POSE_FLAGS = tuple(name for name in POSE_FLAGS if name != "rate")
 
 
 def add_characterize(verbs: Verbs) -> None:
@@ -40,25 +43,27 @@ def add_characterize(verbs: Verbs) -> None:
     verb.add_argument("--minutes", type=positive_float, metavar="M", help=text)
     verb.add_argument("--yes", action="store_true", default=None, help="port: do not wait for Enter between stretches")
     verb.add_argument("--stations", metavar="A,B|A=3,B=1", help="port: names of the stations, as for `harness record`")
-    add_line_flags(verb, "port: frames per second, for a device that does not report its rate")
+    add_line_flags(verb, "port, or poses without times: frames per second")
+    add_pose_flags(verb, shared=("rate",))
 
 
 def run_characterize(args: argparse.Namespace) -> Outcome:
     from harness.report.kit import render_text
     from harness.report.lab.unit_page import unit_page
-    from harness.stream.poses.pose_file import read_pose_log
     from harness.stream.recording import CaptureReader
     from harness.study.trust.characterization import characterize_capture, characterize_log
-    from harness.study.trust.logged_poses import is_recording
 
     options = UnitOptions(args.out, args.expect, args.force)
     expected, pair = read_expected(options), _parse_pair(args.rigid)
-    path = _capture_of(args)
+    is_log = not _is_port(args.source) and holds_poses(Path(args.source))
+    source = Path(args.source) if is_log else _capture_of(args)
     with ProgressBar("parts") as progress:
-        if is_recording(path):
-            found = characterize_capture(CaptureReader(path), expected=expected, rigid=pair, progress=progress)
+        if is_log:
+            refuse_flags(args, _PORT_ALONE, f"with the poses {args.source}", "It is for a port: leave it out.")
+            poses = read_poses([source], pose_options(args))
+            found = characterize_log(poses, expected=expected, rigid=pair, progress=progress)
         else:
-            found = characterize_log(path, read_pose_log(path), expected=expected, rigid=pair, progress=progress)
+            found = characterize_capture(CaptureReader(source), expected=expected, rigid=pair, progress=progress)
     page = unit_page(found.report, this_command(), options.out.name if options.out else "")
     lines, written = write_unit(options, found.unit, page)
     content = {
@@ -90,6 +95,7 @@ def _is_port(source: str) -> bool:
 
 def _capture_of(args: argparse.Namespace) -> Path:
     """The recording to measure; of a port it is made first."""
+    refuse_flags(args, _POSE_FLAGS, f"with {args.source}", "It is for poses of another program: leave it out.")
     if not _is_port(args.source):
         refuse_flags(args, _PORT_FLAGS, f"with the recording {args.source}", "It is for a port: leave it out.")
         return Path(args.source)

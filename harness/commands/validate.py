@@ -4,8 +4,9 @@ import argparse
 import math
 from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, share, split_list
+from harness.commands.flags import Verbs, add_verb, refuse_flags, share, split_list
 from harness.commands.output import print_result, this_command
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
 from harness.commands.unit_results import UnitOptions, add_unit_flags, departure_content, read_expected, write_unit
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
@@ -34,6 +35,7 @@ def add_validate(verbs: Verbs) -> None:
     verb.add_argument("--least-matched", type=share, default=_LEAST_MATCHED, metavar="SHARE", help=text)
     text = "standard deviations of the reference's positions and orientations on each axis, which enter the intervals"
     verb.add_argument("--truth-noise", type=_parse_noise, metavar="MM,DEG", help=text)
+    add_pose_flags(verb)
     text = "unit file to write: that of --expect, or the preset, with what the reference showed; the page is beside it"
     add_unit_flags(verb, text)
 
@@ -52,7 +54,9 @@ def _parse_noise(text: str) -> tuple[float, float]:
 def run_validate(args: argparse.Namespace) -> Outcome:
     from harness.report.kit import render_text
     from harness.report.lab.validation_page import validation_page
-    from harness.study.trust.logged_poses import read_source
+    from harness.stream.recording import CaptureReader
+    from harness.study.trust.capture_readings import read_capture
+    from harness.study.trust.logged_poses import readings_of_poses
     from harness.study.trust.truth_source import TruthSource, load_truth
     from harness.study.trust.validation import ValidationOptions, evaluate_registered, session_unit, validate_capture
 
@@ -62,7 +66,13 @@ def run_validate(args: argparse.Namespace) -> Outcome:
     expected = read_expected(options)
     with ProgressBar("steps") as progress:
         progress("reading", 0, 3)
-        capture = read_source(args.capture)
+        if holds_poses(args.capture):
+            capture = readings_of_poses(read_poses([args.capture], pose_options(args)))
+        else:
+            refuse_flags(
+                args, POSE_FLAGS, f"with {args.capture.name}", "It is for poses of another program: leave it out."
+            )
+            capture = read_capture(CaptureReader(args.capture))
         if args.stations:
             capture = capture.only(split_list(args.stations))
         truth = load_truth(capture, source)

@@ -264,7 +264,8 @@ def _make_grids(
     if matched < least_matched:
         raise NotComparable(
             f"{100.0 * matched:.1f} % of the records due in the overlap have a pose and a reference.",
-            f"At least {100.0 * least_matched:g} % must match; look for gaps in both recordings.",
+            f"At least {100.0 * least_matched:g} % must match; look for gaps in both recordings, or accept fewer "
+            "(--least-matched 0.6).",
         )
     return grids, matched, end_s - begin_s, 0.5 * (begin_s + end_s)
 

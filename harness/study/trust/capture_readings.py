@@ -37,9 +37,9 @@ class CaptureReadings:
     @property
     def rate_hz(self) -> float:
         """Nominal rate of each station; of a pose log the inverse of its mean period [Hz]."""
-        return (
-            self.wire.rate_hz if self.wire else 1.0 / mean_period_s([one.measured_s for one in self.readings.values()])
-        )
+        if self.wire:
+            return self.wire.rate_hz
+        return round(1.0 / mean_period_s([one.measured_s for one in self.readings.values()]), 3)
 
     def only(self, stations: Sequence[str]) -> "CaptureReadings":
         """The readings of some stations; BadInput for one that is not there."""

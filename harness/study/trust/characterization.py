@@ -19,8 +19,7 @@ from harness.measure import UnitFile, UnitProfile, measure_log_profile, measure_
 from harness.measure.reports import Departure, UnitReport, compare_with_expected, make_unit_report
 from harness.results.files import file_digest
 from harness.simulate import noise_preset
-from harness.stream import PoseLog
-from harness.stream.recording import EXPECTED_FILE, CaptureReader
+from harness.stream.recording import EXPECTED_FILE, CaptureReader, PoseRecording
 
 UNIFORM_KEYS = (
     "components.excursion.size_m",
@@ -178,17 +177,16 @@ def characterize_capture(
 
 
 def characterize_log(
-    path: Path,
-    log: PoseLog,
+    recording: PoseRecording,
     *,
     expected: UnitFile | None = None,
     rigid: tuple[str, str] | None = None,
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> Characterization:
-    """Measure the source of a pose log, and compare it with an earlier unit file; it is compared with no preset."""
-    profile = measure_log_profile(log, rigid=rigid, progress=progress)
+    """Measure the source of a file of poses, and compare it with an earlier unit file, but with no preset."""
+    profile = replace(measure_log_profile(recording.log, rigid=rigid, progress=progress), damage=recording.damage)
     known = {} if expected is None else unit_values(expected)
-    return _compare(profile, path, known, expected.name if expected else "")
+    return _compare(profile, recording.path, known, expected.name if expected else "")
 
 
 def _compare(profile: UnitProfile, path: Path, known: Mapping[str, Interval], name: str) -> Characterization:

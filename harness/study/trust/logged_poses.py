@@ -1,38 +1,24 @@
 """Pose logs of other programs as a capture to validate, and as its reference."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 from harness.core import rotations
-from harness.core.file_kind import file_kind
 from harness.measure import TruthPoses, describe_sampling
 from harness.stream import BodyPoses, PoseLog
-from harness.stream.poses.options import PoseFileOptions
-from harness.stream.poses.pose_file import read_pose_log
-from harness.stream.recording import CaptureReader, StationReadings
-from harness.study.trust.capture_readings import CaptureReadings, read_capture
+from harness.stream.recording import PoseRecording, StationReadings
+from harness.study.trust.capture_readings import CaptureReadings
 from harness.study.trust.truth_motion import TruthMotion
 
 
-def read_source(path: Path, options: PoseFileOptions | None = None) -> CaptureReadings:
-    """The readings of a recording, or of a file of poses."""
-    if is_recording(path):
-        return read_capture(CaptureReader(path))
-    return readings_of_log(path, read_pose_log(path, options))
-
-
-def is_recording(path: Path) -> bool:
-    """Whether a file is a recording of the harness, damaged or not; all others are files of poses."""
-    return path.suffix == ".rec" or file_kind(path) == "a recording"
-
-
-def readings_of_log(path: Path, log: PoseLog) -> CaptureReadings:
-    """The bodies of a pose log as stations. The log's clock is both the device's and the host's."""
-    note = {"source": "poses", "start_unix_s": log.start_unix_s}
+def readings_of_poses(recording: PoseRecording) -> CaptureReadings:
+    """The bodies of a file of poses as stations. The log's clock is both the device's and the host's."""
+    log = recording.log
+    note = {**recording.note, "source": "poses", "start_unix_s": log.start_unix_s}
     sampling = tuple(describe_sampling(body.name, body.times_s) for body in log.bodies)
-    return CaptureReadings(path, note, None, {body.name: _readings(body) for body in log.bodies}, (), sampling)
+    readings = {body.name: _readings(body) for body in log.bodies}
+    return CaptureReadings(recording.path, note, None, readings, recording.damage, sampling)
 
 
 def _readings(body: BodyPoses) -> StationReadings:

@@ -31,12 +31,21 @@ TRAJECTORY_SUFFIXES = (".c3d", ".tum", ".csv")
 FEWEST_MARKERS = 3
 MAX_TEXT_BYTES = 512 * MEGABYTE
 CSV_COLUMNS = ("time_s", "station", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
+_LONGEST_HEAD = 65536
 _LABEL_END = re.compile(r"[\s_.\-:]*(?:\d+|[A-Za-z])$")
 _UNIT_TOLERANCE = 1e-2
 _MOST_RESIDUAL_M = 0.02
 """Largest RMS residual of the markers of a rigid body [m] [choice]."""
 _LEAST_SPREAD_M = 0.005
 """Least distance of the markers of a body from their common line [m]."""
+
+
+def is_foreign_table(path: Path) -> bool:
+    """Whether a file is a CSV table without a column for the station, such as another program writes."""
+    if path.suffix.lower() != ".csv":
+        return False
+    with open(path, "rb") as file:
+        return b"station" not in file.readline(_LONGEST_HEAD)
 
 
 def read_truth_file(path: Path, stations: Sequence[str]) -> TruthMotion:
