@@ -36,6 +36,8 @@ def correct_for_reference(
     truths: Sequence[TruthPoses],
     noise: Sequence[tuple[float, float]],
     fixed: Sequence[int] = (),
+    *,
+    plain: bool = False,
 ) -> FittedRegistration:
     """The registration of S stations without the bias by noise of their references, and with its scatter.
 
@@ -44,13 +46,13 @@ def correct_for_reference(
     """
     rng = generator(0, "reference noise")
     exact = [TruthSpline(truth) for truth in truths]
-    start, steps = refit_steps(fit, grids, exact, fixed), []
+    start, steps = refit_steps(fit, grids, exact, fixed, plain=plain), []
     for _ in range(DRAWS):
         noisy = [
             TruthSpline(_with_noise(truth, processes, own, rng))
             for truth, processes, own in zip(truths, fit.noise, noise, strict=True)
         ]
-        steps.append(refit_steps(fit, grids, noisy, fixed) - start)
+        steps.append(refit_steps(fit, grids, noisy, fixed, plain=plain) - start)
     state = fit.state.moved(-np.mean(steps, axis=0))
     scatter = np.cov(np.array(steps).T) * (1.0 + 1.0 / DRAWS)
     residuals = refit_residuals(state, grids, exact)

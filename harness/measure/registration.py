@@ -49,6 +49,8 @@ LEAST_CORRELATION = 0.65
 _OF_IT = "of it"
 MOST_DEVIATION = {"m": 0.05, "rad": float(np.deg2rad(10.0)), "s": 0.05, _OF_IT: 0.1}
 """Largest standard deviation by unit; a parameter with a larger one is not observable."""
+_PLAIN_DEVIATIONS = 3.0
+"""Factor of `MOST_DEVIATION` for sources of unknown noise, whose deviations contain Student's t [choice]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +159,10 @@ class Registration:
 
     @property
     def reference_s(self) -> float:
-        """Time of the reference's clock at which the offsets hold [s]: the middle of the overlap."""
+        """Time of the reference's clock at which the offsets hold [s]: the middle of the overlap.
+
+        For a source of unknown noise it is the time at which the offset is known best.
+        """
         return self.state.reference_s
 
     def room_point(self, point_m: Floats) -> tuple[Interval, Interval, Interval]:
@@ -183,12 +188,14 @@ def register_poses(
     fixed: Collection[str] = (),
     most_clock_error: float = MOST_CLOCK_ERROR,
     truth_noise: Mapping[str, tuple[float, float]] | None = None,
+    plain: bool = False,
 ) -> Registration:
     """Register stations with the reference motion of the bodies that carry them.
 
     `pairs` names the body of each station; by default stations and bodies with the same name. Values that `fixed`
     names, of `FIXABLE`, stay zero: they are not fitted. `truth_noise` holds the standard deviations of the positions
-    [m] and rotations [rad] of bodies, which enter the intervals. BadInput without stamps, for another motion, and for
+    [m] and rotations [rad] of bodies, which enter the intervals. `plain` is for
+    sources of unknown noise (`registration_fit`). BadInput without stamps, for another motion, and for
     other axes or units of the reference. NotComparable for little overlap, few matched records and motion about one
     axis; it names what is not observable.
     """
@@ -207,10 +214,13 @@ def register_poses(
     grids, matched, overlap_s, middle_s = _make_grids(chosen, splines, period_s, coarse, least_matched)
     start = _start(grids, list(splines.values()), coarse.offset_s, middle_s)
     kept = [FIXABLE[name] for name in fixed]
-    fit = fit_registration(list(grids.values()), list(splines.values()), start, kept)
+    fit = fit_registration(list(grids.values()), list(splines.values()), start, kept, plain=plain)
     if truth_noise:
         noise = [truth_noise.get(body, (0.0, 0.0)) for body in named.values()]
-        fit = correct_for_reference(fit, list(grids.values()), [truths[body] for body in named.values()], noise, kept)
+        fit = correct_for_reference(
+            fit, list(grids.values()), [truths[body] for body in named.values()], noise, kept, plain=plain
+        )
+    fit = _at_best_known_time(fit) if plain else fit
     require_orientations([rest[grid.known, 3:] for rest, grid in zip(fit.residuals, grids.values(), strict=True)])
     factor = 1.0 + fit.state.scale
     places_m = {name: rest[used[:, 0], :3] for rest, used, name in zip(fit.residuals, fit.used, grids, strict=True)}
@@ -220,9 +230,27 @@ def register_poses(
         require_positions(places_m, factor, fit.state.heading_rad if known else 0.0, extent_m)
     if np.sqrt(fit.covariance[SCALE, SCALE]) <= MOST_DEVIATION[_OF_IT] * abs(factor):
         require_scale(factor)  # first, because the limits below are in metres
-    _require_observable(fit, list(named))
+    _require_observable(fit, list(named), _PLAIN_DEVIATIONS if plain else 1.0)
     require_clock(fit.state.clock_ratio, float(np.sqrt(fit.covariance[CLOCK, CLOCK])), most_clock_error)
     return _result(named, grids, fit, coarse.correlation, overlap_s, matched)
+
+
+def _at_best_known_time(fit: FittedRegistration) -> FittedRegistration:
+    """The same fit, whose offset holds at the time at which it is known best: where the clock's rate does not move it.
+
+    There it is the offset that one would find without the rate.
+    """
+    covariance = np.array(fit.covariance)
+    if covariance[CLOCK, CLOCK] <= 0.0:
+        return fit
+    later_s = float(-covariance[OFFSET, CLOCK] / covariance[CLOCK, CLOCK])
+    covariance[OFFSET] += later_s * covariance[CLOCK]
+    covariance[:, OFFSET] += later_s * covariance[:, CLOCK]
+    state = fit.state
+    moved = replace(
+        state, reference_s=state.reference_s + later_s, offset_s=state.offset_s + later_s * state.clock_ratio
+    )
+    return replace(fit, state=moved, covariance=covariance)
 
 
 def _extent_m(position_m: Floats) -> float:
@@ -301,7 +329,7 @@ def _start(
     return replace(solve_trimmed(paired, with_scale=False), reference_s=middle_s, offset_s=offset_s)
 
 
-def _require_observable(fit: FittedRegistration, stations: list[str]) -> None:
+def _require_observable(fit: FittedRegistration, stations: list[str], factor: float) -> None:
     deviation = np.sqrt(np.diag(fit.covariance))
     checks = [
         ("the room's rotation", "rad", deviation[ROOM_TURN]),
@@ -317,7 +345,7 @@ def _require_observable(fit: FittedRegistration, stations: list[str]) -> None:
         checks += [(f"the position of {name} on its body", "m", own[3:])]
     for what, unit, values in checks:
         worst = float(np.max(values))
-        if not worst <= MOST_DEVIATION[unit]:
+        if not worst <= factor * MOST_DEVIATION[unit]:
             raise NotComparable(
                 f"Not observable from this motion: {what} (standard deviation {worst:.2g} {unit}).",
                 "Turn every body about two axes and move through the room.",

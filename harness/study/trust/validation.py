@@ -112,6 +112,7 @@ def validate_capture(
         least_matched=options.least_matched,
         fixed=() if wire else ("heading",),
         most_clock_error=MOST_CLOCK_ERROR if wire else _MOST_LOG_CLOCK_ERROR,
+        plain=wire is None,
         truth_noise=dict.fromkeys(bodies, options.truth_noise) if options.truth_noise else truth.noise,
     )
     progress("accuracy", 2, 3)
