@@ -220,7 +220,6 @@ def register_poses(
         fit = correct_for_reference(
             fit, list(grids.values()), [truths[body] for body in named.values()], noise, kept, plain=plain
         )
-    fit = _at_best_known_time(fit) if plain else fit
     require_orientations([rest[grid.known, 3:] for rest, grid in zip(fit.residuals, grids.values(), strict=True)])
     factor = 1.0 + fit.state.scale
     places_m = {name: rest[used[:, 0], :3] for rest, used, name in zip(fit.residuals, fit.used, grids, strict=True)}
@@ -233,24 +232,6 @@ def register_poses(
     _require_observable(fit, list(named), _PLAIN_DEVIATIONS if plain else 1.0)
     require_clock(fit.state.clock_ratio, float(np.sqrt(fit.covariance[CLOCK, CLOCK])), most_clock_error)
     return _result(named, grids, fit, coarse.correlation, overlap_s, matched)
-
-
-def _at_best_known_time(fit: FittedRegistration) -> FittedRegistration:
-    """The same fit, whose offset holds at the time at which it is known best: where the clock's rate does not move it.
-
-    There it is the offset that one would find without the rate.
-    """
-    covariance = np.array(fit.covariance)
-    if covariance[CLOCK, CLOCK] <= 0.0:
-        return fit
-    later_s = float(-covariance[OFFSET, CLOCK] / covariance[CLOCK, CLOCK])
-    covariance[OFFSET] += later_s * covariance[CLOCK]
-    covariance[:, OFFSET] += later_s * covariance[:, CLOCK]
-    state = fit.state
-    moved = replace(
-        state, reference_s=state.reference_s + later_s, offset_s=state.offset_s + later_s * state.clock_ratio
-    )
-    return replace(fit, state=moved, covariance=covariance)
 
 
 def _extent_m(position_m: Floats) -> float:

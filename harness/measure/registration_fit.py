@@ -11,7 +11,7 @@ rest. The covariance is the scatter of blocks.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -98,6 +98,8 @@ def fit_registration(
         _plain_covariance(sums, fixed) if plain else _covariance(sums.information, sums.meat, sums.blocks, fixed)
     )
     blocks = sums.blocks
+    if plain and CLOCK not in fixed:
+        state, covariance = _move_reference(state, covariance, sums.information, fixed)
     residuals = refit_residuals(state, grids, truths)
     return FittedRegistration(state, covariance, blocks, residuals, tuple(used), tuple(noise))
 
@@ -263,6 +265,21 @@ def _alike(noise: StationNoise) -> StationNoise:
 
 _BY_ORIENTATIONS = [0, 1, 2, OFFSET, CLOCK]
 """Parameters that plain least squares find by orientations alone, of those on which positions depend."""
+
+
+def _move_reference(
+    state: RegistrationState, covariance: Floats, information: Floats, fixed: Sequence[int]
+) -> tuple[RegistrationState, Floats]:
+    """The same clocks, whose offset holds where their rate does not move it: as one finds it without the rate."""
+    free = _free(len(information), fixed)
+    inverse = np.linalg.pinv(information[np.ix_(free, free)], rcond=1e-13)
+    offset, clock = free.index(OFFSET), free.index(CLOCK)
+    later_s = float(-inverse[offset, clock] / max(inverse[clock, clock], 1e-300))
+    moved = np.array(covariance)
+    moved[OFFSET] += later_s * moved[CLOCK]
+    moved[:, OFFSET] += later_s * moved[:, CLOCK]
+    at_s, offset_s = state.reference_s + later_s, state.offset_s + later_s * state.clock_ratio
+    return replace(state, reference_s=at_s, offset_s=offset_s), moved
 
 
 def _plain_covariance(sums: _NormalSums, fixed: Sequence[int]) -> Floats:
