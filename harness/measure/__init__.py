@@ -6,13 +6,13 @@ from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
     from harness.measure.angular_speed import coarse_offset, identify_stations
-    from harness.measure.conventions import MOST_CLOCK_ERROR
     from harness.measure.episode_distributions import events_for_precision
     from harness.measure.episodes import Episodes, find_excursions, find_gaps
     from harness.measure.gauss_markov import NOISE_KEYS, ErrorProcess
+    from harness.measure.handeye import PosePairs, most_likely_hand_eye
     from harness.measure.log_profile import measure_log_profile
-    from harness.measure.noise_spectra import ErrorSpectrum, measure_spectrum, pool_spectra
-    from harness.measure.pose_directions import find_directions, inverted_poses, inverted_truth
+    from harness.measure.noise_spectra import ErrorSpectrum, measure_allan, measure_spectrum, pool_spectra
+    from harness.measure.pose_directions import pair_at, same_directions
     from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
     from harness.measure.profile import QualityClass, StretchLength, UnitProfile, measure_profile
     from harness.measure.registration import (
@@ -34,7 +34,6 @@ __all__ = [
     "CUT_ADVICE",
     "LEAST_MATCHED",
     "LEAST_OVERLAP_S",
-    "MOST_CLOCK_ERROR",
     "NOISE_KEYS",
     "TIMING_KEYS",
     "UNIT_FILE",
@@ -42,6 +41,7 @@ __all__ = [
     "ErrorProcess",
     "ErrorSpectrum",
     "MeasuredPoses",
+    "PosePairs",
     "QualityClass",
     "Registration",
     "RigidPair",
@@ -54,19 +54,20 @@ __all__ = [
     "coarse_offset",
     "describe_sampling",
     "events_for_precision",
-    "find_directions",
     "find_excursions",
     "find_gaps",
     "identify_stations",
-    "inverted_poses",
-    "inverted_truth",
     "mean_period_s",
+    "measure_allan",
     "measure_log_profile",
     "measure_profile",
     "measure_spectrum",
+    "most_likely_hand_eye",
+    "pair_at",
     "pool_spectra",
     "read_unit_file",
     "register_poses",
     "require_stamps",
+    "same_directions",
     "write_unit_file",
 ]

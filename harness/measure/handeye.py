@@ -60,6 +60,11 @@ def solve_hand_eye(stations: Sequence[PosePairs], *, with_scale: bool = True) ->
     return RegistrationState(0.0, room, origin_m, scale, 0.0, 0.0, 0.0, 0.0, mounts, mount_m)
 
 
+def most_likely_hand_eye(stations: Sequence[PosePairs], *, with_scale: bool = True) -> RegistrationState:
+    """`solve_hand_eye`, refined by all pairs."""
+    return refine_hand_eye(stations, solve_hand_eye(stations, with_scale=with_scale), with_scale=with_scale)
+
+
 def solve_trimmed(stations: Sequence[PosePairs], *, with_scale: bool = True) -> RegistrationState:
     """As `solve_hand_eye`, of the pairs that agree: those far from the others are left out, again and again.
 

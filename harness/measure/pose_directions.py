@@ -18,6 +18,8 @@ from harness.measure.sampling import mean_period_s
 
 FAR_MOUNT_M = 0.5
 """Distance of two frames on one body from which on the inverse poses are considered [m] [choice]."""
+LEAST_OVERLAP_S = 10.0
+"""Shortest common motion [s]."""
 CLEAR_FACTOR = 3.0
 """Factor by which inverse poses must leave less, or give a shorter mount, to be believed [choice]."""
 
@@ -59,11 +61,25 @@ def inverted_truth(truth: TruthPoses) -> TruthPoses:
     return TruthPoses(truth.time_s, *invert_poses(truth.position_m, truth.world_from_body))
 
 
+def same_directions(
+    stations: Mapping[str, MeasuredPoses], truths: Mapping[str, TruthPoses], pairs: Mapping[str, str]
+) -> tuple[dict[str, MeasuredPoses], dict[str, TruthPoses], tuple[str, ...]]:
+    """Stations and bodies of two logs, inverted where one or both hold body-from-world poses, and why.
+
+    NotComparable as `find_directions`.
+    """
+    found = find_directions(stations, truths, pairs)
+    return (
+        {name: inverted_poses(one) if found.capture else one for name, one in stations.items()},
+        {name: inverted_truth(one) if found.truth else one for name, one in truths.items()},
+        (found.reason,) if found.reason else (),
+    )
+
+
 def find_directions(
     stations: Mapping[str, MeasuredPoses],
     truths: Mapping[str, TruthPoses],
     pairs: Mapping[str, str],
-    least_overlap_s: float,
 ) -> PoseDirections:
     """Which of both logs must be inverted so that they are of the same rigid bodies; nothing is, where none is clear.
 
@@ -72,7 +88,7 @@ def find_directions(
     named = {station: stations[station] for station in pairs}
     period_s = mean_period_s([one.measured_s for one in named.values()])
     splines = {station: TruthSpline(truths[body]) for station, body in pairs.items()}
-    offset_s = coarse_offset(named, splines, period_s, least_overlap_s).offset_s
+    offset_s = coarse_offset(named, splines, period_s, LEAST_OVERLAP_S).offset_s
     found = [
         _candidate(named, truths, pairs, offset_s, capture, truth)
         for capture in (False, True)

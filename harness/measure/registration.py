@@ -1,6 +1,6 @@
 """Registration of a capture with a reference: clocks, room, scale, heading error, and the mount of each station."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from harness.measure.angular_speed import TimeOffset, coarse_offset
 from harness.measure.conventions import (
     MOST_CLOCK_ERROR,
     MOST_PLACE_M,
+    MOST_PLAIN_CLOCK_ERROR,
     require_clock,
     require_orientations,
     require_positions,
@@ -21,6 +22,7 @@ from harness.measure.conventions import (
 )
 from harness.measure.gauss_markov import ErrorProcess
 from harness.measure.handeye import PosePairs, solve_trimmed
+from harness.measure.pose_directions import LEAST_OVERLAP_S
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline, require_pairs
 from harness.measure.reference_noise import correct_for_reference
 from harness.measure.registration_fit import FittedRegistration, StationGrid, fit_registration
@@ -38,12 +40,8 @@ from harness.measure.registration_model import (
 )
 from harness.measure.sampling import mean_period_s, own_places_s
 
-LEAST_OVERLAP_S = 10.0
-"""Shortest common motion of capture and reference [s]."""
 LEAST_MATCHED = 0.95
 """Smallest share of the records due in the overlap that must have a pose, and the reference at their time."""
-FIXABLE = {"scale": SCALE, "heading": HEADING, "ahead": AHEAD, "clock": CLOCK}
-"""Values that a registration can keep at zero -> their places among the parameters."""
 LEAST_CORRELATION = 0.65
 """Smallest correlation of angular speeds with which motion counts as the reference's."""
 _OF_IT = "of it"
@@ -185,19 +183,16 @@ def register_poses(
     pairs: Mapping[str, str] | None = None,
     least_overlap_s: float = LEAST_OVERLAP_S,
     least_matched: float = LEAST_MATCHED,
-    fixed: Collection[str] = (),
-    most_clock_error: float = MOST_CLOCK_ERROR,
     truth_noise: Mapping[str, tuple[float, float]] | None = None,
     plain: bool = False,
 ) -> Registration:
     """Register stations with the reference motion of the bodies that carry them.
 
-    `pairs` names the body of each station; by default stations and bodies with the same name. Values that `fixed`
-    names, of `FIXABLE`, stay zero: they are not fitted. `truth_noise` holds the standard deviations of the positions
-    [m] and rotations [rad] of bodies, which enter the intervals. `plain` is for
-    sources of unknown noise (`registration_fit`). BadInput without stamps, for another motion, and for
-    other axes or units of the reference. NotComparable for little overlap, few matched records and motion about one
-    axis; it names what is not observable.
+    `pairs` names the body of each station; by default stations and bodies with the same name. `truth_noise` holds the
+    standard deviations of the positions [m] and rotations [rad] of bodies, which enter the intervals. `plain` is for
+    sources of unknown noise (`registration_fit`), of which nothing says which axis is vertical: they have no heading
+    error. BadInput without stamps, for another motion, and for other axes or units of the reference. NotComparable for
+    little overlap, few matched records and motion about one axis; it names what is not observable.
     """
     named = dict(pairs) if pairs is not None else {name: name for name in stations if name in truths}
     require_pairs(stations, truths, named)
@@ -213,7 +208,7 @@ def register_poses(
         )
     grids, matched, overlap_s, middle_s = _make_grids(chosen, splines, period_s, coarse, least_matched)
     start = _start(grids, list(splines.values()), coarse.offset_s, middle_s)
-    kept = [FIXABLE[name] for name in fixed]
+    kept = (HEADING,) if plain else ()
     fit = fit_registration(list(grids.values()), list(splines.values()), start, kept, plain=plain)
     if truth_noise:
         noise = [truth_noise.get(body, (0.0, 0.0)) for body in named.values()]
@@ -230,7 +225,8 @@ def register_poses(
     if np.sqrt(fit.covariance[SCALE, SCALE]) <= MOST_DEVIATION[_OF_IT] * abs(factor):
         require_scale(factor)  # first, because the limits below are in metres
     _require_observable(fit, list(named), _PLAIN_DEVIATIONS if plain else 1.0)
-    require_clock(fit.state.clock_ratio, float(np.sqrt(fit.covariance[CLOCK, CLOCK])), most_clock_error)
+    most = MOST_PLAIN_CLOCK_ERROR if plain else MOST_CLOCK_ERROR
+    require_clock(fit.state.clock_ratio, float(np.sqrt(fit.covariance[CLOCK, CLOCK])), most)
     return _result(named, grids, fit, coarse.correlation, overlap_s, matched)
 
 

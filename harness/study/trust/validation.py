@@ -12,19 +12,15 @@ from harness.errors import BadInput, NotComparable
 from harness.experiment import Evaluation, evaluate_each, registered_take
 from harness.measure import (
     LEAST_MATCHED,
-    LEAST_OVERLAP_S,
-    MOST_CLOCK_ERROR,
     MeasuredPoses,
     Registration,
     StationResiduals,
     TruthPoses,
     UnitFile,
-    find_directions,
     identify_stations,
-    inverted_poses,
-    inverted_truth,
     register_poses,
     require_stamps,
+    same_directions,
 )
 from harness.measure.reports import (
     CaptureSummary,
@@ -53,8 +49,6 @@ _MOST_LEFT_OUT = 0.15
 _NO_HOST_CLOCK = "reference not on the host's clock"
 
 
-_MOST_LOG_CLOCK_ERROR = 0.01
-"""Largest relative error between the clocks of two pose logs; a larger one is a wrong rate [choice]."""
 _NO_VERTICAL = "nothing says which axis of a pose log is vertical"
 
 
@@ -74,6 +68,10 @@ class Validation:
 
     capture: CaptureReadings
     truth: TruthMotion
+    poses: Mapping[str, MeasuredPoses]
+    """Station -> the poses that were registered, inverted where the capture holds body-from-world poses."""
+    bodies: Mapping[str, TruthPoses]
+    """Body -> its reference, likewise."""
     registration: Registration
     exchanged: Mapping[str, str]
     """Station -> body that carries it, where that is not the stated one."""
@@ -103,15 +101,14 @@ def validate_capture(
     progress("registration", 1, 3)
     bodies, directions = truth.bodies, ()
     if wire is None and truth.is_log:
-        poses, bodies, directions = _same_direction(poses, truth)
+        named = {station: truth.body_of[station] for station in poses}
+        poses, bodies, directions = same_directions(poses, truth.bodies, named)
     pairs, exchanged = _identify(poses, replace(truth, bodies=bodies))
     registration = register_poses(
         poses,
         bodies,
         pairs=pairs,
         least_matched=options.least_matched,
-        fixed=() if wire else ("heading",),
-        most_clock_error=MOST_CLOCK_ERROR if wire else _MOST_LOG_CLOCK_ERROR,
         plain=wire is None,
         truth_noise=dict.fromkeys(bodies, options.truth_noise) if options.truth_noise else truth.noise,
     )
@@ -165,7 +162,7 @@ def validate_capture(
             "Errors are those after the registration: constant errors of room and mounts are in its numbers.",
         ),
     )
-    return Validation(capture, truth, registration, exchanged, report)
+    return Validation(capture, truth, poses, bodies, registration, exchanged, report)
 
 
 def _comparable_poses(capture: CaptureReadings, truth: TruthMotion) -> tuple[dict[str, MeasuredPoses], tuple[str, ...]]:
@@ -185,17 +182,6 @@ def _comparable_poses(capture: CaptureReadings, truth: TruthMotion) -> tuple[dic
         raise NotComparable(f"No station of {capture.path.name} has a pose.", "Record positions and orientations.")
     unseen = ", ".join(station for station in poses if station not in seen)
     return seen, (f"{unseen}: no pose in the whole capture; left out.",) if unseen else ()
-
-
-def _same_direction(
-    poses: Mapping[str, MeasuredPoses], truth: TruthMotion
-) -> tuple[dict[str, MeasuredPoses], dict[str, TruthPoses], tuple[str, ...]]:
-    """Poses and bodies of two pose logs, inverted where one or both hold body-from-world poses, and why."""
-    pairs = {station: truth.body_of[station] for station in poses}
-    found = find_directions(poses, truth.bodies, pairs, LEAST_OVERLAP_S)
-    stations = {name: inverted_poses(one) if found.capture else one for name, one in poses.items()}
-    bodies = {name: inverted_truth(one) if found.truth else one for name, one in truth.bodies.items()}
-    return stations, bodies, (found.reason,) if found.reason else ()
 
 
 def _describe_clocks(capture: CaptureReadings, truth: TruthMotion, registration: Registration) -> tuple[str, ...]:
