@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from harness.commands.flags import (
     add_verb,
     line_options,
     parse_device_names,
+    parse_pair,
     positive_float,
     refuse_flags,
 )
@@ -23,6 +25,7 @@ from harness.core.progress import ProgressBar
 from harness.errors import BadFile, BadInput, Outcome
 
 if TYPE_CHECKING:
+    from harness.measure import Bar
     from harness.stream.recording import Stretch
 
 _DEFAULT_STATIC_MIN, _SWEEP_S, _COVERED_S = 17.0, 30.0, 20.0
@@ -39,6 +42,10 @@ def add_characterize(verbs: Verbs) -> None:
     add_unit_flags(verb, "unit file to write; the page is written beside it")
     text = "two stations on one bar: they show errors in motion without a reference"
     verb.add_argument("--rigid", metavar="A,B", help=text)
+    text = "--rigid: length of the bar from one station's origin to the other's, and its standard uncertainty"
+    verb.add_argument("--length", type=parse_pair, metavar="MM,MM", help=text)
+    text = "points, x y z [m] a line, on which one station rests in this order"
+    verb.add_argument("--surveyed", type=Path, metavar="FILE", help=text)
     text = f"port: minutes at rest (default {_DEFAULT_STATIC_MIN:g})"
     verb.add_argument("--minutes", type=positive_float, metavar="M", help=text)
     verb.add_argument("--yes", action="store_true", default=None, help="port: do not wait for Enter between stretches")
@@ -48,22 +55,27 @@ def add_characterize(verbs: Verbs) -> None:
 
 
 def run_characterize(args: argparse.Namespace) -> Outcome:
+    from harness.measure import compare_with_survey
     from harness.report.kit import render_text
     from harness.report.lab.unit_page import unit_page
     from harness.stream.recording import CaptureReader
     from harness.study.trust.characterization import characterize_capture, characterize_log
+    from harness.study.trust.survey_file import read_surveyed_points
 
     options = UnitOptions(args.out, args.expect, args.force)
-    expected, pair = read_expected(options), _parse_pair(args.rigid)
+    expected, bar = read_expected(options), _parse_bar(args.rigid, args.length)
+    points_m = read_surveyed_points(args.surveyed) if args.surveyed else None
     is_log = not _is_port(args.source) and holds_poses(Path(args.source))
     source = Path(args.source) if is_log else _capture_of(args)
     with ProgressBar("parts") as progress:
         if is_log:
             refuse_flags(args, _PORT_ALONE, f"with the poses {args.source}", "It is for a port: leave it out.")
             poses = read_poses([source], pose_options(args))
-            found = characterize_log(poses, expected=expected, rigid=pair, progress=progress)
+            found = characterize_log(poses, expected=expected, bar=bar, progress=progress)
         else:
-            found = characterize_capture(CaptureReader(source), expected=expected, rigid=pair, progress=progress)
+            found = characterize_capture(CaptureReader(source), expected=expected, bar=bar, progress=progress)
+    if points_m is not None:
+        found = replace(found, survey=compare_with_survey(found.profile.places, points_m))
     page = unit_page(found.report, this_command(), options.out.name if options.out else "")
     lines, written = write_unit(options, found.unit, page)
     content = {
@@ -71,6 +83,8 @@ def run_characterize(args: argparse.Namespace) -> Outcome:
         "parameters": {key: number.as_dict() for key, number in found.profile.parameters.items()},
         "timing": {key: number.as_dict() for key, number in found.profile.timing.all_stations.items()},
         "departures": departure_content(found.named, "p", "p_holm"),
+        "budget": pair.budget.as_dict() if (pair := found.profile.rigid) else None,
+        "survey": found.survey.budget.as_dict() if found.survey else None,
         "damage": list(found.profile.damage),
         "notes": list(found.profile.limits),
         **written,
@@ -78,13 +92,18 @@ def run_characterize(args: argparse.Namespace) -> Outcome:
     return print_result(args, content, render_text(page), *lines)
 
 
-def _parse_pair(text: str | None) -> tuple[str, str] | None:
+def _parse_bar(text: str | None, length_mm: tuple[float, float] | None) -> "Bar | None":
+    from harness.measure import Bar
+
     if text is None:
+        if length_mm is not None:
+            raise BadInput("--length without --rigid.", "Name the two stations on the bar: --rigid A,B.")
         return None
     names = [name.strip() for name in text.split(",")]
     if len(names) != 2 or not all(names):
         raise BadInput(f"--rigid {text!r}.", "Name the two stations on the bar: --rigid left_hand,right_hand.")
-    return names[0], names[1]
+    stated_m = None if length_mm is None else (1e-3 * length_mm[0], 1e-3 * length_mm[1])
+    return Bar((names[0], names[1]), stated_m)
 
 
 def _is_port(source: str) -> bool:

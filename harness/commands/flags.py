@@ -224,6 +224,17 @@ def share(text: str) -> float:
     return value
 
 
+def parse_pair(text: str) -> tuple[float, float]:
+    """Two numbers of 0 or more, for argparse."""
+    try:
+        first, second = (float(word) for word in text.split(","))
+    except ValueError:
+        first = second = math.nan
+    if not (0.0 <= first < math.inf and 0.0 <= second < math.inf):
+        raise argparse.ArgumentTypeError(f"{text!r} is no pair of numbers, such as 0.2,0.1")
+    return first, second
+
+
 def split_list(text: str | None) -> list[str]:
     """The entries of a list that is separated by commas outside brackets; [] without one; BadInput for an empty one."""
     entries = [entry.strip() for entry in split_outside_brackets(text, ",")] if text else []

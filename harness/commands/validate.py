@@ -4,14 +4,12 @@ import argparse
 import math
 from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, refuse_flags, share, split_list
+from harness.commands.flags import Verbs, add_verb, parse_pair, refuse_flags, share, split_list
 from harness.commands.output import print_result, this_command
 from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
 from harness.commands.unit_results import UnitOptions, add_unit_flags, departure_content, read_expected, write_unit
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
-
-_LEAST_MATCHED = 0.95
 
 
 def add_validate(verbs: Verbs) -> None:
@@ -31,24 +29,13 @@ def add_validate(verbs: Verbs) -> None:
         "--methods", metavar="A,B", help="clip: methods to reconstruct and score with what was registered"
     )
     verb.add_argument("--stations", metavar="A,B", help="compare these stations only (default: all)")
-    text = f"smallest share of the records that must have a reference (default {_LEAST_MATCHED:g})"
-    verb.add_argument("--least-matched", type=share, default=_LEAST_MATCHED, metavar="SHARE", help=text)
+    text = "smallest share of the records that must have a reference (default 0.95)"
+    verb.add_argument("--least-matched", type=share, default=0.95, metavar="SHARE", help=text)
     text = "standard deviations of the reference's positions and orientations on each axis, which enter the intervals"
-    verb.add_argument("--truth-noise", type=_parse_noise, metavar="MM,DEG", help=text)
+    verb.add_argument("--truth-noise", type=parse_pair, metavar="MM,DEG", help=text)
     add_pose_flags(verb)
     text = "unit file to write: that of --expect, or the preset, with what the reference showed; the page is beside it"
     add_unit_flags(verb, text)
-
-
-def _parse_noise(text: str) -> tuple[float, float]:
-    """Millimetres and degrees as metres and radians."""
-    try:
-        place_mm, turn_deg = (float(word) for word in text.split(","))
-    except ValueError:
-        place_mm = turn_deg = math.nan
-    if not (0.0 <= place_mm < math.inf and 0.0 <= turn_deg < math.inf):
-        raise argparse.ArgumentTypeError(f"{text!r} is no pair of millimetres and degrees, such as 0.2,0.1")
-    return 1e-3 * place_mm, math.radians(turn_deg)
 
 
 def run_validate(args: argparse.Namespace) -> Outcome:
@@ -79,7 +66,8 @@ def run_validate(args: argparse.Namespace) -> Outcome:
         if methods and truth.playback is None:
             advice = "Only a clip has a performer's body to score on: leave it out."
             raise BadInput(f"--methods with {truth.title}.", advice)
-        limits = ValidationOptions(args.least_matched, args.truth_noise)
+        noise = None if args.truth_noise is None else (1e-3 * args.truth_noise[0], math.radians(args.truth_noise[1]))
+        limits = ValidationOptions(args.least_matched, noise)
         found = validate_capture(capture, truth, expected=expected, options=limits, progress=progress)
         scores = evaluate_registered(found, methods, progress) if methods else []
     report = found.report

@@ -14,9 +14,8 @@ if TYPE_CHECKING:
     from harness.measure.noise_spectra import ErrorSpectrum, measure_allan, measure_spectrum, pool_spectra
     from harness.measure.pose_directions import pair_at, same_directions
     from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
-    from harness.measure.profile import QualityClass, StretchLength, UnitProfile, measure_profile
+    from harness.measure.profile import Bar, QualityClass, StretchLength, UnitProfile, measure_profile
     from harness.measure.registration import (
-        LEAST_MATCHED,
         LEAST_OVERLAP_S,
         Registration,
         StationResiduals,
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     )
     from harness.measure.rigid_pair import RigidPair
     from harness.measure.sampling import describe_sampling, mean_period_s
+    from harness.measure.surveyed_points import compare_with_survey
     from harness.measure.timing import TIMING_KEYS
     from harness.measure.unit_file import CUT_ADVICE, UNIT_FILE, UnitFile, read_unit_file, write_unit_file
 else:
@@ -32,11 +32,11 @@ else:
 
 __all__ = [
     "CUT_ADVICE",
-    "LEAST_MATCHED",
     "LEAST_OVERLAP_S",
     "NOISE_KEYS",
     "TIMING_KEYS",
     "UNIT_FILE",
+    "Bar",
     "Episodes",
     "ErrorProcess",
     "ErrorSpectrum",
@@ -52,6 +52,7 @@ __all__ = [
     "UnitFile",
     "UnitProfile",
     "coarse_offset",
+    "compare_with_survey",
     "describe_sampling",
     "events_for_precision",
     "find_excursions",

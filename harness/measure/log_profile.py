@@ -9,17 +9,18 @@ from harness.core.arrays import Bools, Floats
 from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
-from harness.measure.episode_fit import EXCURSION_RATE, EpisodeFit
-from harness.measure.gauss_markov import NOISE_KEYS
+from harness.measure.episode_fit import EpisodeFit
 from harness.measure.log_series import PAUSE_S, EvenSeries, even_series, find_repeats, neighbour_noise
 from harness.measure.noise_fit import NoiseFit
 from harness.measure.profile import (
     STATIC_CORRELATIONS,
+    Bar,
     CollectedReadings,
     StretchLength,
     UnitProfile,
     fit_rest,
     require_pair,
+    without_rest,
 )
 from harness.measure.sampling import LOST_STEP, describe_sampling, mean_period_s
 from harness.measure.timing import TIMING_KEYS, TimingMeasurement, count_share
@@ -37,15 +38,15 @@ _NO_HOST = "A file of poses has no clock of a host."
 def measure_log_profile(
     log: PoseLog,
     *,
-    rigid: tuple[str, str] | None = None,
+    bar: Bar | None = None,
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> UnitProfile:
     """Measure the source of a pose log, at rest or moving.
 
     Noise and episodes are those of rests, at an even rate. A moving body shows its timing, and a bound of its noise.
-    BadInput for bodies of `rigid` that are not in it, and without a body of 20 poses.
+    BadInput for bodies of `bar` that are not in it, and without a body of 20 poses.
     """
-    require_pair(rigid, log.names)
+    require_pair(bar, log.names)
     bodies = [body for body in log.bodies if len(body.times_s) >= _FEWEST]
     if not bodies:
         raise BadInput(f"{log.source} has no body with {_FEWEST} poses.", "Record for longer.")
@@ -53,11 +54,11 @@ def measure_log_profile(
     kept = {name: ~same if same.mean() < _MOST_REPEATS else np.ones(len(same), bool) for name, same in repeats.items()}
     series = {body.name: even_series(body, kept[body.name]) for body in bodies}
     rate_hz = round(1.0 / mean_period_s([body.times_s for body in bodies]), 3)
-    collected = CollectedReadings(rate_hz, rigid)
+    collected = CollectedReadings(rate_hz, bar)
     for name, even in series.items():
         for part in even.parts:
             collected.add_rest(name, part, even.rate_hz)
-    if rigid:
+    if bar:
         collected.add_motion({body.name: _raw(body, kept[body.name]) for body in bodies})
     unseen = [body.name for body in log.bodies if body not in bodies]
     notes = [f"{name}: fewer than {_FEWEST} poses, not measured." for name in unseen]
@@ -77,6 +78,7 @@ def measure_log_profile(
         episodes,
         (),
         collected.rigid_pair(),
+        tuple(collected.places),
         (*notes, *collected.limits()),
     )
 
@@ -98,8 +100,7 @@ def _fit(collected: CollectedReadings, notes: list[str], progress: ProgressCallb
                     f"shorter than {STATIC_CORRELATIONS:g} times that: rest for longer."
                 )
             return noise, episodes
-    missing = Interval.missing(reason)
-    return NoiseFit(dict.fromkeys(NOISE_KEYS, missing), {}), EpisodeFit({EXCURSION_RATE: missing}, {}, {}, ())
+    return without_rest(reason)
 
 
 def _raw(body: BodyPoses, kept: Bools) -> StationReadings:

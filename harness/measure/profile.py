@@ -16,11 +16,12 @@ from harness.core.arrays import Bools, Floats
 from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput
-from harness.measure.episode_fit import EpisodeFit, find_disturbances, fit_episodes
-from harness.measure.gauss_markov import ErrorProcess
+from harness.measure.episode_fit import EXCURSION_RATE, EpisodeFit, find_disturbances, fit_episodes
+from harness.measure.gauss_markov import NOISE_KEYS, ErrorProcess
 from harness.measure.noise_fit import NoiseFit, fit_noise, start_values
 from harness.measure.rigid_pair import RigidPair, measure_rigid_pair
 from harness.measure.static_series import StaticSeries, find_rest, static_series
+from harness.measure.surveyed_points import RestPlace
 from harness.measure.timing import TimingAccumulator, TimingMeasurement
 from harness.stream.recording import CaptureReader, StationReadings
 
@@ -45,6 +46,15 @@ class StretchLength:
     """Name of its mark; "" without one."""
     duration_s: float
     records: int
+
+
+@dataclass(frozen=True)
+class Bar:
+    """Two stations on one rigid bar."""
+
+    stations: tuple[str, str]
+    stated_m: tuple[float, float] | None = None
+    """Length that somebody measured, and its standard uncertainty [m]; None where nobody did."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +89,8 @@ class UnitProfile:
     episodes: EpisodeFit
     quality: tuple[QualityClass, ...]
     rigid: RigidPair | None
+    places: tuple[RestPlace, ...]
+    """Where stations rested, in the order in which it was found."""
     limits: tuple[str, ...]
     """What this capture cannot show, a sentence each."""
 
@@ -107,17 +119,17 @@ class UnitProfile:
 def measure_profile(
     reader: CaptureReader,
     *,
-    rigid: tuple[str, str] | None = None,
+    bar: Bar | None = None,
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> UnitProfile:
     """Measure a unit from a capture.
 
-    BadFile for a capture without a rest of at least ten correlation times. BadInput for a station of `rigid` that is
-    not in it.
+    BadFile for a capture without a rest of at least ten correlation times, unless it has a moving bar. BadInput for a
+    station of `bar` that is not in it.
     """
-    require_pair(rigid, reader.wire.stations)
+    require_pair(bar, reader.wire.stations)
     collected, timing, garbage_bytes = (
-        CollectedReadings(reader.wire.rate_hz, rigid),
+        CollectedReadings(reader.wire.rate_hz, bar),
         TimingAccumulator(reader.wire.rate_hz),
         0,
     )
@@ -126,12 +138,14 @@ def measure_profile(
         timing.add(block)
         garbage_bytes += block.garbage_bytes
         collected.add(block.stretch, block.stations)
-    if not collected.rest:
+    if not collected.rest and bar is None:
         advice = "Let all stations lie still for a minute or more, in sight of the emitters."
         raise BadFile(reader.path, "no stretch in which a station rests", _CAPTURE, advice)
-    noise, episodes = fit_rest(collected.rest, progress)
+    noise, episodes = (
+        fit_rest(collected.rest, progress) if collected.rest else without_rest("No station rests for 5 s.")
+    )
     correlation = noise.all_stations["components.drift.correlation_s"]
-    longest_s = max(one.duration_s for one in collected.rest)
+    longest_s = max((one.duration_s for one in collected.rest), default=0.0)
     if correlation.is_measured and longest_s < STATIC_CORRELATIONS * correlation.value:
         found = f"a rest of {longest_s:.3g} s, with errors that are correlated over {correlation.value:.3g} s"
         expected = f"a rest of {STATIC_CORRELATIONS * correlation.value:.3g} s or more"
@@ -149,26 +163,35 @@ def measure_profile(
         episodes,
         _quality_errors(collected.rest + collected.covered),
         collected.rigid_pair(),
+        tuple(collected.places),
         collected.limits(),
     )
 
 
-def require_pair(rigid: tuple[str, str] | None, stations: tuple[str, ...]) -> None:
-    """Raise BadInput unless a pair names two of the stations."""
-    for name in rigid or ():
+def require_pair(bar: Bar | None, stations: tuple[str, ...]) -> None:
+    """Raise BadInput unless a bar has two of the stations."""
+    names = bar.stations if bar else ()
+    for name in names:
         if name not in stations:
             raise BadInput(f"No station {name!r} in the capture.", f"It has {', '.join(stations)}.")
-    if rigid and rigid[0] == rigid[1]:
-        raise BadInput(f"--rigid names {rigid[0]} twice.", "Name the two stations on the bar.")
+    if names and names[0] == names[1]:
+        raise BadInput(f"--rigid names {names[0]} twice.", "Name the two stations on the bar.")
+
+
+def without_rest(reason: str) -> tuple[NoiseFit, EpisodeFit]:
+    """Noise and episodes that were not measured, and why."""
+    missing = Interval.missing(reason)
+    return NoiseFit(dict.fromkeys(NOISE_KEYS, missing), {}), EpisodeFit({EXCURSION_RATE: missing}, {}, {}, ())
 
 
 class CollectedReadings:
     """What is kept of the readings of a capture while they come: stations at rest, and a moving bar."""
 
-    def __init__(self, rate_hz: float, rigid: tuple[str, str] | None) -> None:
-        self._rate_hz, self._rigid = rate_hz, rigid
+    def __init__(self, rate_hz: float, bar: Bar | None) -> None:
+        self._rate_hz, self._bar = rate_hz, bar
         self.rest: list[StaticSeries] = []
         self.covered: list[StaticSeries] = []
+        self.places: list[RestPlace] = []
         self._samples = 0
         self._left_out_s = 0.0
         self._moved = 0
@@ -186,7 +209,7 @@ class CollectedReadings:
             return
         for station, readings in stations.items() if stretch in (*REST_STRETCHES, _COVERED) else ():
             self.add_rest(station, readings, self._rate_hz, stretch)
-        if self._rigid and stretch not in ("static", _COVERED) and self._moved < MOST_REST_SAMPLES:
+        if self._bar and stretch not in ("static", _COVERED) and self._moved < MOST_REST_SAMPLES:
             self._moved += records
             self.add_motion(stations)
 
@@ -195,11 +218,13 @@ class CollectedReadings:
         for rest in find_rest(readings, rate_hz).tolist():
             kept = self.covered if stretch == _COVERED else self.rest
             self._keep(kept, static_series(readings, (rest[0], rest[1]), rate_hz, station))
+            self.places.append(_rest_place(station, readings, slice(rest[0], rest[1])))
 
     def add_motion(self, stations: Mapping[str, StationReadings]) -> None:
         """Keep the two stations on a bar; their records need no even rate."""
-        if self._rigid:
-            self._motion.append((stations[self._rigid[0]], stations[self._rigid[1]]))
+        if self._bar:
+            first, second = self._bar.stations
+            self._motion.append((stations[first], stations[second]))
 
     def _keep(self, kept: list[StaticSeries], series: StaticSeries) -> None:
         if series.valid.sum() < 2.0 * series.rate_hz:
@@ -214,7 +239,7 @@ class CollectedReadings:
         return tuple(StretchLength(name, one[0], int(one[1])) for name, one in self._stretches.items())
 
     def rigid_pair(self) -> RigidPair | None:
-        if self._rigid is None:
+        if self._bar is None:
             return None
         columns = []
         for number in (0, 1):
@@ -229,7 +254,13 @@ class CollectedReadings:
                 sound &= np.diff(time_s, prepend=-np.inf) > 0.0
             columns.append((time_s[sound], place[sound], turn[sound]))
         first, second = columns
-        return measure_rigid_pair(self._rigid, (first[0], second[0]), (first[1], second[1]), (first[2], second[2]))
+        return measure_rigid_pair(
+            self._bar.stations,
+            (first[0], second[0]),
+            (first[1], second[1]),
+            (first[2], second[2]),
+            self._bar.stated_m,
+        )
 
     def limits(self) -> tuple[str, ...]:
         if not self._left_out_s:
@@ -238,6 +269,12 @@ class CollectedReadings:
             f"Errors at rest are those of the first {self._samples:,} samples; {self._left_out_s / 60.0:.0f} station "
             "minutes after them show the timing only.",
         )
+
+
+def _rest_place(station: str, readings: StationReadings, rows: slice) -> RestPlace:
+    place_m = readings.position_m[rows][np.isfinite(readings.position_m[rows, 0])]
+    begin_s = float(readings.received_s[rows][0])
+    return RestPlace(station, begin_s, np.median(place_m, axis=0), np.std(place_m, axis=0), len(place_m))
 
 
 def fit_rest(rest: list[StaticSeries], progress: ProgressCallback) -> tuple[NoiseFit, EpisodeFit]:
@@ -267,6 +304,8 @@ def _excursion_noise(noise: NoiseFit, start: Floats) -> ErrorProcess:
 
 def _quality_errors(series: list[StaticSeries]) -> tuple[QualityClass, ...]:
     """Distance from the resting place, by classes of quality; the first class holds the lost readings."""
+    if not series:
+        return ()
     quality = np.concatenate([one.quality for one in series])
     away_m = np.concatenate([np.linalg.norm(one.position_m, axis=1) for one in series])
     came = np.isfinite(quality)

@@ -25,6 +25,7 @@ from harness.measure.reports.departures import Departure
 from harness.measure.rest_statistics import drift_speed, mean_drift, rest_distance
 from harness.measure.rigid_pair import RigidPair
 from harness.measure.static_series import StaticSeries
+from harness.measure.surveyed_points import SurveyComparison
 from harness.measure.unit_file import UnitFile
 
 PRECISION = 0.2
@@ -221,12 +222,19 @@ class UnitReport:
     advice: tuple[RecordingAdvice, ...] = ()
     rigid_pairs: tuple[RigidPair, ...] = ()
     """Pairs of stations on one bar; empty without any."""
+    survey: SurveyComparison | None = None
+    """Rests against surveyed points."""
     notes: tuple[str, ...] = ()
     """What cannot be told from this capture and what to know about it, a sentence each."""
 
 
 def make_unit_report(
-    profile: UnitProfile, unit: UnitFile, checks: Sequence[Departure], expected_from: str, defaults: Mapping[str, float]
+    profile: UnitProfile,
+    unit: UnitFile,
+    checks: Sequence[Departure],
+    expected_from: str,
+    defaults: Mapping[str, float],
+    survey: SurveyComparison | None = None,
 ) -> UnitReport:
     """The report on a profile whose unit file is `unit`; `defaults` are the preset's values of its keys."""
     parameters = {**profile.parameters, **profile.episodes.means}
@@ -265,6 +273,7 @@ def make_unit_report(
         quality=profile.quality,
         advice=_advice(profile),
         rigid_pairs=(profile.rigid,) if profile.rigid else (),
+        survey=survey,
         notes=profile.limits,
     )
 

@@ -15,8 +15,8 @@ from harness.core.fields import replace_fields
 from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
-from harness.measure import UnitFile, UnitProfile, measure_log_profile, measure_profile
-from harness.measure.reports import Departure, UnitReport, compare_with_expected, make_unit_report
+from harness.measure import Bar, UnitFile, UnitProfile, measure_log_profile, measure_profile
+from harness.measure.reports import Departure, SurveyComparison, UnitReport, compare_with_expected, make_unit_report
 from harness.results.files import file_digest
 from harness.simulate import noise_preset
 from harness.stream.recording import EXPECTED_FILE, CaptureReader, PoseRecording
@@ -147,6 +147,8 @@ class Characterization:
     checks: tuple[Departure, ...]
     expected_from: str
     """Origin of the expected numbers: the preset, or the name of an earlier unit."""
+    survey: SurveyComparison | None = None
+    """Rests against surveyed points; None without any."""
 
     @property
     def named(self) -> tuple[Departure, ...]:
@@ -157,21 +159,21 @@ class Characterization:
     def report(self) -> UnitReport:
         """All that the unit's page shows."""
         defaults = {key: number.value for key, number in preset_values().items()} if self.profile.items else {}
-        return make_unit_report(self.profile, self.unit, self.checks, self.expected_from, defaults)
+        return make_unit_report(self.profile, self.unit, self.checks, self.expected_from, defaults, self.survey)
 
 
 def characterize_capture(
     reader: CaptureReader,
     *,
     expected: UnitFile | None = None,
-    rigid: tuple[str, str] | None = None,
+    bar: Bar | None = None,
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> Characterization:
     """Measure a unit from a capture, and compare it with the preset `default` or with an earlier unit file.
 
     The unit has the name of the capture. BadFile and BadInput as `measure.profile.measure_profile`.
     """
-    profile = measure_profile(reader, rigid=rigid, progress=progress)
+    profile = measure_profile(reader, bar=bar, progress=progress)
     known = preset_values() if expected is None else unit_values(expected)
     return _compare(profile, reader.path, known, expected.name if expected else "the preset default")
 
@@ -180,11 +182,11 @@ def characterize_log(
     recording: PoseRecording,
     *,
     expected: UnitFile | None = None,
-    rigid: tuple[str, str] | None = None,
+    bar: Bar | None = None,
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> Characterization:
     """Measure the source of a file of poses, and compare it with an earlier unit file, but with no preset."""
-    profile = replace(measure_log_profile(recording.log, rigid=rigid, progress=progress), damage=recording.damage)
+    profile = replace(measure_log_profile(recording.log, bar=bar, progress=progress), damage=recording.damage)
     known = {} if expected is None else unit_values(expected)
     return _compare(profile, recording.path, known, expected.name if expected else "")
 

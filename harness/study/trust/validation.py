@@ -11,7 +11,6 @@ from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
 from harness.experiment import Evaluation, evaluate_each, registered_take
 from harness.measure import (
-    LEAST_MATCHED,
     MeasuredPoses,
     Registration,
     StationResiduals,
@@ -56,7 +55,7 @@ _NO_VERTICAL = "nothing says which axis of a pose log is vertical"
 class ValidationOptions:
     """What a user allows and knows about a capture and its reference."""
 
-    least_matched: float = LEAST_MATCHED
+    least_matched: float = 0.95
     """Smallest share of the records due that must have a reference."""
     truth_noise: tuple[float, float] | None = None
     """Standard deviations of the reference's positions [m] and rotations [rad] on each axis; None where unknown."""
