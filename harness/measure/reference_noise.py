@@ -2,8 +2,9 @@
 
 Noise of the reference is in the derivatives as well as in the residuals. It makes estimates smaller, such as the error
 along the velocity, which no residual shows. Noise of the stated size is added once more, several times, and the
-registration is fitted again. The mean change is taken back, and the scatter enters the covariance. The added noise is
-as quick or slow as what the registration left, of which that of the reference is a part.
+registration is fitted again, also with twice that variance: a parabola leads back to no noise. The scatter enters the
+covariance, and so does the difference from a straight line. The added noise is as quick or slow as what the
+registration left, of which that of the reference is a part.
 """
 
 import math
@@ -27,7 +28,9 @@ from harness.measure.registration_fit import (
 )
 
 DRAWS = 12
-"""Number of references with added noise."""
+"""Number of references with added noise of each size."""
+_MOST_NOISE = math.sqrt(2.0)
+"""Largest added noise, in standard deviations of what the registration left."""
 
 
 def correct_for_reference(
@@ -44,17 +47,20 @@ def correct_for_reference(
     `noise` holds standard deviations of each axis of positions [m] and of rotation vectors [rad]. More than a station's
     residuals have is not added.
     """
-    rng = generator(0, "reference noise")
     exact = [TruthSpline(truth) for truth in truths]
-    start, steps = refit_steps(fit, grids, exact, fixed, plain=plain), []
-    for _ in range(DRAWS):
-        noisy = [
-            TruthSpline(_with_noise(truth, processes, own, rng))
-            for truth, processes, own in zip(truths, fit.noise, noise, strict=True)
-        ]
-        steps.append(refit_steps(fit, grids, noisy, fixed, plain=plain) - start)
-    state = fit.state.moved(-np.mean(steps, axis=0))
-    scatter = np.cov(np.array(steps).T) * (1.0 + 1.0 / DRAWS)
+    start = refit_steps(fit, grids, exact, fixed, plain=plain)
+    once, twice = np.zeros((DRAWS, len(start))), np.zeros((DRAWS, len(start)))
+    for steps, factor in ((once, 1.0), (twice, math.sqrt(2.0))):
+        rng = generator(0, "reference noise")
+        for draw in range(DRAWS):
+            noisy = [
+                TruthSpline(_with_noise(truth, processes, (factor * place_m, factor * turn_rad), rng))
+                for truth, processes, (place_m, turn_rad) in zip(truths, fit.noise, noise, strict=True)
+            ]
+            steps[draw] = refit_steps(fit, grids, noisy, fixed, plain=plain) - start
+    state = fit.state.moved(np.mean(twice - 3.0 * once, axis=0))
+    scatter = np.cov(once.T) + np.cov((twice - 3.0 * once).T) / DRAWS
+    scatter += np.diag(np.mean(twice - 2.0 * once, axis=0) ** 2)
     residuals = refit_residuals(state, grids, exact)
     return replace(fit, state=state, covariance=fit.covariance + scatter, residuals=residuals)
 
@@ -83,6 +89,6 @@ def _draw(process: ErrorProcess, size: float, time_s: Floats, axes: int, rng: np
     grid_s = time_s[0] + step_s * np.arange(count)
     drift = np.stack([np.interp(time_s, grid_s, column) for column in even.T], axis=1)
     whole = process.drift * drift + process.white * rng.normal(size=(len(time_s), axes))
-    factor = min(size / max(math.hypot(process.drift, process.white), 1e-300), 1.0)
+    factor = min(size / max(math.hypot(process.drift, process.white), 1e-300), _MOST_NOISE)
     out: Floats = factor * whole
     return out
