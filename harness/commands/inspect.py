@@ -3,9 +3,15 @@
 import argparse
 from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, output_file, refuse_flags, repeat_flags
+from harness.commands.flags import (
+    Verbs,
+    add_verb,
+    output_file,
+    refuse_flags,
+    repeat_flags,
+)
 from harness.commands.output import print_result
-from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags
 from harness.core.units import parse_length_unit
 from harness.errors import Outcome
 
@@ -68,8 +74,8 @@ def run_inspect(args: argparse.Namespace) -> Outcome:
 
 
 def _is_of_poses(path: Path) -> bool:
-    """Whether a file is no motion and no constellation, by its name, and holds poses."""
+    """Whether the name of a file is neither that of motion nor that of a constellation."""
     from harness.mocap import CLIP_FORMATS
 
     others = (*(f".{kind}" for kind in (*CLIP_FORMATS, "asf")), CONSTELLATION_SUFFIX)
-    return path.suffix.lower() not in others and holds_poses(path)
+    return path.suffix.lower() not in others

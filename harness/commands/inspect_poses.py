@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,24 +23,12 @@ _HEAD = ("body", "poses", "rate [Hz]", "90 % of steps [ms]", "gaps", "longest ga
 
 def inspect_poses(args: argparse.Namespace, paths: Sequence[Path]) -> Outcome:
     """Print what one file of poses is, or several on one clock."""
-    from harness.stream import UnknownRate, measure_sampling
+    from harness.stream import UNTIMED, measure_sampling
 
-    options, timed = pose_options(args), True
-    try:
-        found = read_poses(paths, options)
-    except UnknownRate:
-        found, timed = read_poses(paths, replace(options, rate_hz=1.0)), False
-    log = found.log
+    found = read_poses(paths, pose_options(args, untimed=True))
+    log, timed = found.log, found.log.clock != UNTIMED
     bodies = [measure_sampling(body) for body in log.bodies]
-    lines = [_title(log, timed=timed)]
-    findings = [asdict(finding) for finding in log.findings]
-    if timed:
-        lines += map(str, log.findings)
-    else:
-        lines += [str(finding) for finding in log.findings if finding.subject != "time"]
-        findings = [finding for finding in findings if finding["subject"] != "time"]
-        lines.append("time: none (the file has no times: give its samples per second, --rate HZ)")
-    lines += _recording_lines(found)
+    lines = [_title(log, timed=timed), *map(str, log.findings), *_recording_lines(found)]
     rows = [
         [
             one.name,
@@ -57,10 +45,10 @@ def inspect_poses(args: argparse.Namespace, paths: Sequence[Path]) -> Outcome:
     lines += ["", *Table(_HEAD, rows).lines()]
     content = {
         "source": log.source,
-        "clock": log.clock if timed else "none",
+        "clock": log.clock,
         "start_unix_s": log.start_unix_s,
         "duration_s": log.duration_s if timed else None,
-        "findings": findings,
+        "findings": [asdict(finding) for finding in log.findings],
         "bodies": [
             asdict(one) if timed else {"name": one.name, "poses": one.poses, "repeated_share": one.repeated_share}
             for one in bodies
@@ -68,9 +56,12 @@ def inspect_poses(args: argparse.Namespace, paths: Sequence[Path]) -> Outcome:
         "marks": [{"at_s": at_s, "stretch": stretch} for at_s, stretch in found.marks],
         "damage": list(found.damage),
     }
-    following = ["characterize", *paths, *repeat_flags(args, *POSE_FLAGS)]
+    flags = repeat_flags(args, *POSE_FLAGS)
+    following = ["characterize", *paths, *flags]
+    if len(paths) > 1:
+        following = ["validate", paths[0], "--truth", paths[1], *flags]
     if not timed:
-        following = ["inspect", *paths, *repeat_flags(args, *POSE_FLAGS), "--rate", "HZ"]
+        following = ["inspect", *paths, *flags, "--rate", "HZ"]
     return print_result(args, content, *lines, following=following)
 
 
@@ -78,7 +69,7 @@ def _title(log: "PoseLog", *, timed: bool) -> str:
     poses = sum(len(body.times_s) for body in log.bodies)
     bodies = "1 body" if len(log.bodies) == 1 else f"{len(log.bodies)} bodies"
     duration = f", {log.duration_s:.2f} s" if timed else ""
-    clock = f", {log.clock}" if timed else ""
+    clock = f", {log.clock}"
     if log.start_unix_s is not None:
         clock += f" from {datetime.fromtimestamp(log.start_unix_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
     return f"{log.source}: {poses:,} poses of {bodies}{duration}{clock}"

@@ -1,11 +1,10 @@
-"""Flags of verbs that read poses of other programs, and the reading."""
+"""Flags of verbs that read poses of other programs, and the reading: text files, recordings of poses, C3D clusters."""
 
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.flags import split_list
 from harness.core.units import TIME_UNITS_S, parse_length_unit
 from harness.errors import BadInput
 
@@ -33,31 +32,36 @@ def add_pose_flags(verb: argparse.ArgumentParser, *, shared: Sequence[str] = ())
         poses.add_argument("--rate", metavar="HZ", type=float, help="samples per second of a file without times")
 
 
-def pose_options(args: argparse.Namespace) -> "PoseFileOptions":
-    """What the flags say. Raises BadInput."""
+def pose_options(args: argparse.Namespace, *, untimed: bool = False) -> "PoseFileOptions":
+    """What the flags say; `untimed` reads files without times and rate all the same. Raises BadInput."""
     from harness.stream import PoseFileOptions
 
-    columns = split_list(args.columns)
-    return PoseFileOptions(
-        tuple(columns) if columns else None, args.unit, args.quaternion, args.up, args.time_unit, args.rate
-    )
+    columns = None if args.columns is None else tuple(name.strip() for name in args.columns.split(","))
+    return PoseFileOptions(columns, args.unit, args.quaternion, args.up, args.time_unit, args.rate, untimed)
 
 
 def holds_poses(path: Path) -> bool:
-    """Whether a file holds poses: a recording of them, a text that no other verb reads, or markers."""
+    """Whether a file may hold poses: a recording of them, rows of numbers, or markers; never motion of a skeleton."""
+    from harness.mocap import CLIP_FORMATS
     from harness.stream.recording import is_pose_file
 
-    return is_pose_file(path) or (path.suffix.lower() == MARKER_SUFFIX and path.is_file())
+    kind = path.suffix.lower()
+    if kind in (*(f".{kind}" for kind in CLIP_FORMATS), ".asf"):
+        return kind == MARKER_SUFFIX and path.is_file()
+    return is_pose_file(path)
 
 
 def read_poses(paths: Sequence[Path], options: "PoseFileOptions") -> "PoseRecording":
     """Read a recording of poses, files of other programs, or clusters of markers. Raises BadFile or BadInput."""
+    from harness.stream import PoseFileOptions
     from harness.stream.recording import PoseRecording, open_poses
 
     if not any(path.suffix.lower() == MARKER_SUFFIX for path in paths):
         return open_poses(paths, options)
     if len(paths) > 1:
         raise BadInput(f"{len(paths)} files with markers among them.", "Name one C3D file alone.")
+    if options != PoseFileOptions(unit_m=options.unit_m, untimed=options.untimed):
+        raise BadInput(f"Options of text files for {paths[0].name}.", "A C3D file takes --unit alone.")
     from harness.study.trust.marker_poses import read_marker_poses
 
     return PoseRecording(paths[0], read_marker_poses(paths[0], options.unit_m), {})

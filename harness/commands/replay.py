@@ -8,7 +8,14 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.flags import Verbs, add_verb, parse_methods, parse_names, refuse_flags, repeat_flags
+from harness.commands.flags import (
+    Verbs,
+    add_verb,
+    parse_methods,
+    parse_names,
+    refuse_flags,
+    repeat_flags,
+)
 from harness.commands.output import print_caveat, print_data, print_result, print_status
 from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
 from harness.core.number_format import format_fixed

@@ -7,15 +7,23 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.commands.flags import Verbs, add_verb, output_file, parse_methods, positive_float
+from harness.commands.flags import (
+    Verbs,
+    add_verb,
+    output_file,
+    parse_methods,
+    positive_float,
+    refuse_flags,
+)
 from harness.commands.output import print_result, print_status
-from harness.commands.pose_flags import add_pose_flags, pose_options
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 
 if TYPE_CHECKING:
     from harness.view import ViewedMotion
 
+_POSE_FLAGS = tuple(name for name in POSE_FLAGS if name != "rate")
 _MOST_SAVED_S = 60.0
 """Longest movie that the page may ask for [s]; `--save` has no such limit."""
 
@@ -70,9 +78,14 @@ def run_view(args: argparse.Namespace) -> Outcome:
 
 
 def _open(args: argparse.Namespace) -> "ViewedMotion":
-    from harness.commands.viewed_motion import open_motion
+    from harness.commands.viewed_motion import open_motion, view_poses
 
     methods = None if args.methods is None else parse_methods(args.methods)
+    if holds_poses(Path(args.what)):
+        advice = "Poses of another program name no performer, mounts or motion: leave it out."
+        refuse_flags(args, ("methods", "scenario", "clip", "seed", "mocap"), f"with the poses of {args.what}", advice)
+        return view_poses(read_poses([Path(args.what)], pose_options(args)))
+    refuse_flags(args, _POSE_FLAGS, f"with {args.what}", "It is for poses of another program: leave it out.")
     of_run = Path(args.what).is_dir()
     playback = {"scenario": args.scenario, "clip": None if of_run else args.clip, "seed": args.seed}
     options = {
@@ -80,7 +93,6 @@ def _open(args: argparse.Namespace) -> "ViewedMotion":
         "mocap": args.mocap,
         "rate_hz": args.rate,
         "playback": playback,
-        "poses": pose_options(args),
     }
     with ProgressBar("steps") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
         motion = open_motion(args.what, **options, progress=bar)

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from harness.commands.pose_flags import holds_poses, read_poses
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
@@ -24,12 +23,11 @@ from harness.mocap import (
     read_clip,
 )
 from harness.report.kit import NO_ESTIMATE, PlayerClip, PlayerStations, PlayerTrack, hold_last
-from harness.stream import PoseFileOptions
-from harness.stream.recording import PoseLogStream
 from harness.view import ViewedMotion
 
 if TYPE_CHECKING:
     from harness.stream import TrackerFrame
+    from harness.stream.recording import PoseRecording
 
 _SEED = 1
 """Seed of built-in motion that is named by its take, as in the shipped scenarios."""
@@ -43,26 +41,19 @@ def open_motion(
     mocap: LibraryFolders | None,
     rate_hz: float | None,
     playback: dict[str, Any],
-    poses: PoseFileOptions | None = None,
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> ViewedMotion:
     """Open the motion that a text names: a folder, a file, or a clip.
 
     `methods` are those of a run or recording; None is all of a run and none of a recording. `rate_hz` is the rate of an
-    AMC file that no index names, `playback` the options of `recorded_take.find_playback`, `poses` what the user says of
-    a file of poses. `progress` is called while methods learn and run. Raises UnknownName, BadFile or BadInput for what
-    cannot be shown.
+    AMC file that no index names, `playback` the options of `recorded_take.find_playback`. `progress` is called while
+    methods learn and run. Raises UnknownName, BadFile or BadInput for what cannot be shown.
     """
     path = Path(what)
     if path.is_dir():
         _refuse_options(playback, "A run")
         return _view_run(path, methods)
     is_motion = path.suffix.lower().lstrip(".") in (*CLIP_FORMATS, "asf")
-    if path.exists() and not is_motion and holds_poses(path):
-        if methods:
-            raise BadInput(f"--methods with {what}.", "Poses of another program name no performer and no mounts.")
-        _refuse_options(playback, "A file of poses")
-        return _view_poses(path, poses)
     if path.exists() and not is_motion:
         return _view_recording(path, methods or (), playback, mocap, progress)
     if methods:
@@ -197,9 +188,11 @@ def _view_recording(
     )
 
 
-def _view_poses(path: Path, options: PoseFileOptions | None) -> ViewedMotion:
-    """The bodies of a pose log in their own world, with what was concluded and assumed about it as a note."""
-    found = read_poses([path], options or PoseFileOptions())
+def view_poses(found: "PoseRecording") -> ViewedMotion:
+    """The bodies of poses of another program in their own world; the note tells what was assumed about them."""
+    from harness.stream.recording import PoseLogStream
+
+    path = found.path
     stream = PoseLogStream(found.log)
     frames = tuple(stream)
     stations = _stations(stream.stations, frames, np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3))

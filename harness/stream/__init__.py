@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from harness.stream.host_clock import HostClockEstimator
     from harness.stream.inputs import INPUT_COMBINATIONS, make_inputs
     from harness.stream.line_events import EventCounter, LineEvent
-    from harness.stream.poses.options import QUATERNION_ORDERS, UP_AXES, PoseFileOptions
-    from harness.stream.poses.pose_file import UnknownRate
+    from harness.stream.poses.options import PoseFileOptions
+    from harness.stream.poses.pose_file import UNTIMED
     from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
     from harness.stream.poses.pose_statistics import measure_sampling
     from harness.stream.station_counts import FRAME_COLUMNS, StationCounts, StreamSummary, format_csv_row, frame_rows
@@ -20,8 +20,7 @@ else:
 __all__ = [
     "FRAME_COLUMNS",
     "INPUT_COMBINATIONS",
-    "QUATERNION_ORDERS",
-    "UP_AXES",
+    "UNTIMED",
     "BodyPoses",
     "EventCounter",
     "FileFinding",
@@ -33,7 +32,6 @@ __all__ = [
     "StreamSummary",
     "TrackerFrame",
     "TrackerStream",
-    "UnknownRate",
     "format_csv_row",
     "frame_rows",
     "make_inputs",

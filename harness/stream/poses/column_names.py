@@ -48,6 +48,8 @@ class ColumnName:
     """What is left of the name when the other words are taken away: the name of a body."""
     unit: str = ""
     """The unit that the name states, such as `mm` or `ns`; "" without one."""
+    family: str = ""
+    """The word before a component: `rx` and `qx` beside each other are different things."""
     numbered: bool = False
     """Whether `q0` to `q3` name the components, so that their order is a convention."""
 
@@ -88,7 +90,7 @@ def parse_column_name(cells: Sequence[str]) -> ColumnName:
         length = find_unit(unit, LENGTH_UNITS_M)
         return ColumnName(kind, axis, body, length) if length or not unit else ColumnName("")
     if kind:
-        return ColumnName(kind, axis, body, numbered=leaf in _NUMBERED)
+        return ColumnName(kind, axis, body, family=leaf[:-1], numbered=leaf in _NUMBERED)
     if leaf in _FRAME or words[0] in _FRAME:
         return ColumnName("frame")
     return ColumnName("body" if {*words} <= _BODY | {"frame", "rigid"} else "")

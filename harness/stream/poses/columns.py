@@ -21,6 +21,8 @@ _ADVICE = "Name the columns in their order, - for others: --columns time,x,y,z,q
 _LABELS = {"id", "parent", "asset id", "type"}
 """First words of header lines that name neither bodies nor columns; "type" is used to leave markers out."""
 _QUATERNION = ("w", "x", "y", "z")
+_RATES = ("export frame rate", "capture frame rate", "objects", "segments")
+"""Names of the rate in the headers of OptiTrack's and Vicon's programs."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ def find_columns(head: TableHead, names: Sequence[str] | None = None) -> TableCo
         if len(names) > head.columns:
             found = f"{head.columns} columns, where --columns names {len(names)}"
             raise BadFile(head.path, found, "no more names than columns", _ADVICE)
-        paths = [(name,) for name in names] + [("-",)] * (head.columns - len(names))
+        paths = [(name,) for name in (*names, *["-"] * (head.columns - len(names)))]
         return _from_names(head, paths, "given by --columns", {})
     facts = _facts(head.header)
     if facts.get("rotation type", "quaternion").lower() != "quaternion":
@@ -76,9 +78,9 @@ def find_columns(head: TableHead, names: Sequence[str] | None = None) -> TableCo
     if best is None or scores[best] < min(6, head.columns):
         return _from_numbers(head)
     above = [_spread(row) for row in rows[:best] if _is_context(row)]
-    paths = [(*(row[c] for row in above), rows[best][c]) for c in range(head.columns)]
+    cells = [(*(row[c] for row in above), rows[best][c]) for c in range(head.columns)]
     units = rows[best + 1] if best + 1 < len(rows) else ("",) * head.columns
-    return _from_names(head, paths, "the header's names", facts, units)
+    return _from_names(head, cells, "the header's names", facts, units)
 
 
 def _fit(row: Sequence[str], columns: int) -> tuple[str, ...]:
@@ -109,8 +111,11 @@ def _spread(row: Sequence[str]) -> list[str]:
 
 
 def _facts(header: Sequence[Sequence[str]]) -> dict[str, str]:
-    """Names and values of header lines such as `Length Units,Meters`."""
-    return {name.lower(): value for row in header for name, value in pairwise(row) if name and value}
+    """Names and values of header lines such as `Length Units,Meters`, or of two lines with a cell each."""
+    filled = [[cell for cell in row if cell] for row in header]
+    pairs = [pair for row in header for pair in pairwise(row)]
+    pairs += [(a[0], b[0]) for a, b in pairwise(filled) if len(a) == len(b) == 1]
+    return {name.lower(): value for name, value in pairs if name and value}
 
 
 @dataclass
@@ -118,6 +123,7 @@ class _Group:
     """Columns of one body while they are collected."""
 
     name: str
+    family: str
     columns: dict[str, int] = field(default_factory=dict)
 
 
@@ -132,10 +138,10 @@ def _from_names(
     groups: dict[str, list[_Group]] = {"position": [], "quaternion": []}
     for c, name in enumerate(names):
         if name.kind in groups and c not in head.text_columns:
-            same = [group for group in groups[name.kind] if group.name == name.body]
+            same = [group for group in groups[name.kind] if (group.name, group.family) == (name.body, name.family)]
             free = next((group for group in same if name.axis not in group.columns), None)
             if free is None:
-                groups[name.kind].append(free := _Group(name.body))
+                groups[name.kind].append(free := _Group(name.body, name.family))
             free.columns[name.axis] = c
     places = [group for group in groups["position"] if set(group.columns) == set(AXES)]
     turns = [group for group in groups["quaternion"] if set(group.columns) == set(_QUATERNION)]
@@ -147,8 +153,9 @@ def _from_names(
     numbered = any(names[c].numbered for c in chosen)
     lengths = {names[c].unit or _unit_of(units, c, LENGTH_UNITS_M) for body in bodies for c in body.position}
     lengths.add(next((find_unit(facts[key], LENGTH_UNITS_M) for key in ("length units", "units") if key in facts), ""))
-    rate = next((facts[key] for key in ("export frame rate", "capture frame rate") if key in facts), "")
-    text = ", ".join("/".join(filter(None, path)) for c, path in enumerate(paths) if c in (time, *chosen[:7]))
+    rate = next((facts[key] for key in _RATES if key in facts), "")
+    text = ", ".join("/".join(filter(None, paths[c])) for c in sorted(chosen[:7]))
+    text = text if time is None else f"{paths[time][-1]}, {text}"
     return TableColumns(
         bodies,
         time,
@@ -185,8 +192,8 @@ def _pair(places: Sequence[_Group], turns: Sequence[_Group]) -> tuple[BodyColumn
 def _missing(
     path: Path, names: Sequence[ColumnName], paths: Sequence[Sequence[str]], has_place: bool, has_turn: bool
 ) -> BadFile:
-    angles = [p[-1] for name, p in zip(names, paths, strict=True) if name.kind == "angle" or name.axis in AXES]
-    if has_place and not has_turn and angles and any(name.kind == "angle" for name in names):
+    angles = [p[-1] for name, p in zip(names, paths, strict=True) if name.kind == "angle" or name.family == "r"]
+    if has_place and not has_turn and angles:
         found = f"angles ({', '.join(angles[:6])}) of a convention that the file does not name"
         return BadFile(path, found, "quaternions or matrices", "Export quaternions.")
     lacks = "position" if not has_place else "quaternion" if not has_turn else "body with both of them"

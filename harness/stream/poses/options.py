@@ -26,6 +26,8 @@ class PoseFileOptions:
     """Unit of the times: "s", "ms", "us" or "ns"."""
     rate_hz: float | None = None
     """Samples per second of a file without times."""
+    untimed: bool = False
+    """Whether a file without times and without a rate is read all the same, with numbers of samples as its times."""
 
     def __post_init__(self) -> None:
         for flag, value, known in (

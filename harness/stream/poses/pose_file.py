@@ -3,6 +3,7 @@
 Everything that the file does not say is concluded from its numbers, or assumed, and stands in the findings of the log.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from harness.stream.poses.evidence import (
     conclude_length_unit,
     conclude_quaternion_order,
     conclude_time_unit,
+    counts_samples,
 )
 from harness.stream.poses.matrices import holds_matrices, split_matrices
 from harness.stream.poses.number_table import EXPECTED_FILE, TableHead, read_head, read_rows
@@ -35,8 +37,15 @@ _UP_TO_Z = {
     "-x": (0.5**0.5, 0.0, 0.5**0.5, 0.0),
 }
 """Axis that points up -> quaternion that turns it to z."""
-_LOST_M = 0.05
-"""Distance from poses before and after at which positions of exactly (0, 0, 0) count as not seen [m] [choice]."""
+_LOST_SHARE = 0.05
+"""Distance from (0, 0, 0) of the poses before and after, in median distances, from which on positions that are exactly
+there count as not seen [choice]."""
+_CUT_NORMS, _EXACT_NORM = 3.0, 1e-8
+"""Deviations of a norm from 1 that show a row to be cut: in those of the other rows, and above that of exact ones."""
+_FARTHEST, _LONGEST_S = 1e9, 1e10
+"""Largest coordinate, in the file's unit, and longest log: three centuries [s] [choices]."""
+UNTIMED = "numbers of samples"
+"""Clock of a log whose source has no times, where no rate was given either."""
 
 
 class UnknownRate(BadInput):
@@ -116,8 +125,9 @@ def _read_file(path: Path, options: PoseFileOptions) -> PoseLog:
         raw = [
             _RawPoses(n, times, poses[:, c : c + 3], poses[:, c + 3 : c + 7]) for n, c in zip(names, width, strict=True)
         ]
-    del table, poses
-    return _finish(head, options, columns, raw, findings, counted=columns.time is None)
+    ends_whole = table.ends_whole
+    del table, times, poses, counted
+    return _finish(head, options, columns, raw, findings, counted=columns.time is None, cut=not ends_whole)
 
 
 def _read_matrices(head: TableHead, options: PoseFileOptions) -> PoseLog:
@@ -131,18 +141,22 @@ def _read_matrices(head: TableHead, options: PoseFileOptions) -> PoseLog:
     raw = [_RawPoses(head.path.stem, counted if times is None else times, positions, quaternions)]
     body = BodyColumns("", (0, 1, 2), (3, 4, 5, 6))
     columns = TableColumns((body,), None if times is None else 0, None, None, order="wxyz", order_reason="")
-    return _finish(head, options, columns, raw, findings, counted=times is None)
+    return _finish(head, options, columns, raw, findings, counted=times is None, cut=False)
 
 
 def _body_names(path: Path, columns: TableColumns, words: tuple[str, ...]) -> list[str]:
     """Names of the bodies, each another."""
     if columns.body is not None:
-        return [word or path.stem for word in words]
+        return [f"{float(word):g}" if _is_number(word) else word or path.stem for word in words]
     names = [body.name for body in columns.bodies]
     if names == [""]:
         return [path.stem]
     numbered = [name or f"body{n}" for n, name in enumerate(names, 1)]
     return [name if numbered.count(name) == 1 else f"{name}_{n}" for n, name in enumerate(numbered, 1)]
+
+
+def _is_number(word: str) -> bool:
+    return bool(re.fullmatch(r"\d+\.?\d*", word))
 
 
 def _finish(
@@ -153,6 +167,7 @@ def _finish(
     findings: list[FileFinding],
     *,
     counted: bool,
+    cut: bool,
 ) -> PoseLog:
     """Units, order, frame and clock; rows without a pose and doubled ones are left out."""
     path = head.path
@@ -160,23 +175,24 @@ def _finish(
         names = ", ".join(one.name for one in raw[:12])
         findings.append(FileFinding("bodies", f"{len(raw)}: {names}", "the columns' or rows' names"))
     scale_s, clock = _conclude_clock(path, options, columns, raw, findings, counted=counted)
-    raw = [replace(one, times_s=one.times_s * scale_s) for one in raw]
-    raw = [_seen_rows(path, one, findings) for one in raw]
+    for n, one in enumerate(raw):  # one after another, for memory
+        raw[n] = _in_order(_seen_rows(path, replace(one, times_s=one.times_s * scale_s), findings, cut=cut), findings)
     raw = [one for one in raw if len(one.times_s)]
     if not raw:
         raise BadFile(path, "no row with a time and a pose", EXPECTED_FILE, "Is it the right file?")
-    raw = [_in_order(one, findings) for one in raw]
     largest = max(raw, key=lambda one: len(one.times_s))
-    order = _conclude_order(options, columns, largest, findings)
+    order = _conclude_order(options, columns, largest, findings, usual="wxyz" if scale_s == 1e-9 else "xyzw")
     unit, unit_m = conclude_length_unit(
-        largest.positions, None if counted else largest.times_s, columns.length_unit, options.unit_m
+        largest.positions, None if clock == UNTIMED else largest.times_s, columns.length_unit, options.unit_m
     )
     findings.append(unit)
     turn = _conclude_up(options, columns, findings)
     start_s = min(float(one.times_s[0]) for one in raw)
-    bodies = tuple(_to_body(one, order, unit_m, turn, start_s) for one in raw)
+    bodies = []
+    while raw:
+        bodies.append(_to_body(raw.pop(0), order, unit_m, turn, start_s))
     unix = clock == "Unix time"
-    return PoseLog(bodies, path.name, tuple(findings), clock, start_s if unix else None)
+    return PoseLog(tuple(bodies), path.name, tuple(findings), clock, start_s if unix else None)
 
 
 def _conclude_clock(
@@ -189,11 +205,21 @@ def _conclude_clock(
     counted: bool,
 ) -> tuple[float, str]:
     """Seconds of 1 in the column of times, and what they count. UnknownRate without either."""
+    times = np.unique(np.concatenate([one.times_s for one in raw]))
+    times = times[np.isfinite(times)]
+    if not len(times):
+        raise BadFile(path, "no time that is a number", EXPECTED_FILE, "Is it the right file?")
+    numbered = columns.frame is not None
+    if not counted and not columns.time_unit and options.time_unit is None and counts_samples(times):
+        counted = numbered = True
     if counted:
-        what = "numbers of samples" if columns.frame is not None else "no times"
+        what = "no times, but numbers of samples" if numbered else "no times"
         rate_hz = options.rate_hz or columns.rate_hz
         if options.time_unit is not None:
-            raise BadInput(f"--time-unit for {path.name}, which has {what}.", "Give --rate HZ instead.")
+            raise BadInput(f"--time-unit, but {path.name} has {what}.", "Give --rate HZ instead.")
+        if rate_hz is None and options.untimed:
+            findings.append(FileFinding("time", "none: give the samples per second with --rate HZ", f"it has {what}"))
+            return 1.0, UNTIMED
         if rate_hz is None:
             rows = sum(len(one.times_s) for one in raw)
             raise UnknownRate(f"{path.name} has {what} ({count_noun(rows, 'sample')}).")
@@ -202,36 +228,42 @@ def _conclude_clock(
         return 1.0 / rate_hz, f"samples counted at {rate_hz:g} Hz"
     if options.rate_hz is not None:
         raise BadInput(f"{path.name} has times of its own.", "Leave out --rate.")
-    times = np.unique(np.concatenate([one.times_s for one in raw]))
-    times = times[np.isfinite(times)]
-    if not len(times):
-        raise BadFile(path, "no time that is a number", EXPECTED_FILE, "Is it the right file?")
     unit = conclude_time_unit(times, columns.time_unit, options.time_unit)
     findings.append(unit)
     scale_s = TIME_UNITS_S[unit.value]
-    if not np.isfinite(scale_s * (times[-1] - times[0])):
-        raise BadFile(path, "times that are too large", EXPECTED_FILE, "Are the columns right?")
+    with np.errstate(over="ignore"):
+        length_s = scale_s * (times[-1] - times[0])
+    if not length_s <= _LONGEST_S:
+        raise BadFile(path, f"times that span {length_s:.3g} s", EXPECTED_FILE, "Are columns and --time-unit right?")
     unix = UNIX_S[0] <= times[0] * scale_s <= UNIX_S[1]
     return scale_s, "Unix time" if unix else "seconds from an unknown start"
 
 
-def _seen_rows(path: Path, raw: _RawPoses, findings: list[FileFinding]) -> _RawPoses:
-    """The rows that hold a pose. BadFile for quaternions of another norm than 1."""
+def _seen_rows(path: Path, raw: _RawPoses, findings: list[FileFinding], *, cut: bool) -> _RawPoses:
+    """The rows that hold a pose. BadFile for quaternions of another norm than 1.
+
+    With `cut` the file ends without a line end: a last row with the worst norm has lost digits.
+    """
     with np.errstate(over="ignore", invalid="ignore"):
         norm = np.sqrt(np.sum(raw.quaternions**2, axis=1))
     present = np.isfinite(raw.times_s) & np.isfinite(raw.positions).all(axis=1) & np.isfinite(norm) & (norm > 0.0)
-    wrong = np.flatnonzero(present & (np.abs(norm - 1.0) > NORM_TOLERANCE))
-    if len(wrong) == 1 and wrong[0] == len(norm) - 1 and len(norm) > 1:  # the last row was cut off
-        present[wrong] = False
-    elif len(wrong):
+    deviation = np.where(present, np.abs(norm - 1.0), 0.0)
+    if cut and len(norm) > 1 and deviation[-1] > _CUT_NORMS * deviation[:-1].max() + _EXACT_NORM:
+        present[-1] = False
+    wrong = np.flatnonzero(present & (deviation > NORM_TOLERANCE))
+    if len(wrong):
         found = f"a quaternion of norm {norm[wrong[0]]:.3g} in row {wrong[0] + 1} of {raw.name}"
         raise BadFile(path, found, "unit quaternions", "Name the columns with --columns, or remove damaged rows.")
+    far = np.flatnonzero(present & (np.abs(raw.positions) > _FARTHEST).any(axis=1))
+    if len(far):
+        found = f"a position of {np.abs(raw.positions[far[0]]).max():.3g} in row {far[0] + 1} of {raw.name}"
+        raise BadFile(path, found, "coordinates in a unit of length", "Are the columns right?")
     zero = present & ~raw.positions.any(axis=1)
     if zero.any() and not zero[present].all():
         present &= ~_lost_at_origin(raw.positions, present, zero)
     lost = int(len(present) - np.count_nonzero(present))
     if lost:
-        reason = "empty cells, quaternions of 0, or positions that jump to exactly (0, 0, 0)"
+        reason = "empty cells, a row that was cut off, quaternions of 0, or positions that jump to (0, 0, 0)"
         findings.append(FileFinding(f"gaps of {raw.name}", f"{lost} of {len(present)} rows hold no pose", reason))
     rows = np.flatnonzero(present)
     return _RawPoses(raw.name, raw.times_s[rows], raw.positions[rows], raw.quaternions[rows] / norm[rows, None])
@@ -245,7 +277,7 @@ def _lost_at_origin(positions: Floats, present: Bools, zero: Bools) -> Bools:
     at = np.flatnonzero(zero)
     after = np.searchsorted(rows, at).clip(max=len(rows) - 1)
     before = (np.searchsorted(rows, at) - 1).clip(min=0)
-    near = np.minimum(size[before], size[after]) < _LOST_M * scale
+    near = np.minimum(size[before], size[after]) < _LOST_SHARE * scale
     out: Bools = np.zeros_like(zero)
     out[at[~near]] = True
     return out
@@ -273,12 +305,11 @@ def _in_order(raw: _RawPoses, findings: list[FileFinding]) -> _RawPoses:
 
 
 def _conclude_order(
-    options: PoseFileOptions, columns: TableColumns, raw: _RawPoses, findings: list[FileFinding]
+    options: PoseFileOptions, columns: TableColumns, raw: _RawPoses, findings: list[FileFinding], usual: str
 ) -> list[int]:
-    """Places of w, x, y, z in the file's quaternions."""
+    """Places of w, x, y, z in the file's quaternions; `usual` is EuRoC's order for times in ns."""
     if columns.order and not columns.order_reason:
         return [0, 1, 2, 3]  # matrices
-    euroc = raw.times_s[0] * 1e9 > 1e15 and columns.time_unit == "ns"
     finding = conclude_quaternion_order(
         raw.positions,
         raw.quaternions,
@@ -286,7 +317,7 @@ def _conclude_order(
         stated=columns.order,
         reason=columns.order_reason,
         given=options.quaternion,
-        usual="wxyz" if euroc else "xyzw",
+        usual=usual,
     )
     findings.append(finding)
     return [finding.value.index(axis) for axis in "wxyz"]

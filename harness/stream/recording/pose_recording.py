@@ -21,11 +21,11 @@ from harness.core.file_kind import POSES_KIND, file_kind
 from harness.core.files import atomic_path, require_writable
 from harness.core.input_file import open_input_file, read_input_file
 from harness.errors import BadFile, BadInput, HarnessError
+from harness.stream.poses.number_table import EXPECTED_FILE, read_head
 from harness.stream.poses.options import PoseFileOptions
 from harness.stream.poses.pose_file import read_pose_log
 from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
 from harness.stream.recording.blocks import (
-    BLOCK_MARKER,
     BODIES,
     MARK,
     MAX_PAYLOAD_BYTES,
@@ -43,7 +43,6 @@ from harness.stream.recording.recording import MAX_BYTES, PLAN_FILE, Recording, 
 EXPECTED_POSES = "a recording of poses by `harness record`"
 _ROW = np.dtype([("body", "<u4"), ("time_s", "<f8"), ("position_m", "<f8", 3), ("quaternion", "<f8", 4)])
 _ROWS_PER_BLOCK = MAX_PAYLOAD_BYTES // _ROW.itemsize
-_TEXT_BYTES = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +67,7 @@ class PoseRecording:
 def open_poses(paths: Sequence[Path], options: PoseFileOptions | None = None) -> PoseRecording:
     """Read a recording of poses, or files of another program (`read_pose_log`). Raises BadFile as these do."""
     if len(paths) == 1 and is_pose_recording(paths[0]):
-        if options not in (None, PoseFileOptions()):
+        if options is not None and replace(options, untimed=False) != PoseFileOptions():
             advice = "Units, columns and axes were settled when it was made: leave such options out."
             raise BadInput(f"{paths[0].name} is a recording of poses.", advice)
         return read_pose_recording(paths[0])
@@ -77,18 +76,21 @@ def open_poses(paths: Sequence[Path], options: PoseFileOptions | None = None) ->
 
 def is_pose_recording(path: Path) -> bool:
     """Whether a file begins as a recording of poses. Raises BadFile for one that cannot be read."""
-    with open_input_file(path, EXPECTED_POSES, MAX_BYTES) as file:
+    with open_input_file(path, EXPECTED_FILE, MAX_BYTES) as file:
         return read_version(file.read(len(POSES_HEADER))) == POSES_VERSION
 
 
 def is_pose_file(path: Path) -> bool:
-    """Whether a file is a recording of poses, or a text of no other kind; False for what is no file."""
-    kind = file_kind(path)
-    if kind or not path.is_file():
-        return kind == POSES_KIND
-    with open_input_file(path, EXPECTED_POSES, MAX_BYTES) as file:
-        data = file.read(_TEXT_BYTES)
-    return b"\0" not in data.removeprefix(b"\xff\xfe") and BLOCK_MARKER not in data
+    """Whether a file is a recording of poses, or text with rows of numbers that no other verb reads."""
+    if not path.is_file():
+        return False
+    if file_kind(path) == POSES_KIND:
+        return True
+    try:
+        read_head(path)
+    except BadFile:
+        return False
+    return True
 
 
 def write_pose_recording(

@@ -53,7 +53,6 @@ from harness.stream.recording.blocks import (
     POSES_VERSION,
     RECEIVED,
     SENT,
-    VERSION,
     DamagedSpan,
     RecordingBlock,
     encode_block,
@@ -242,9 +241,9 @@ def _check_kind(path: Path, data: bytes) -> None:
     if version == POSES_VERSION:
         expected = "a recording of a device's line"
         raise BadFile(path, "a recording of poses", expected, "`harness inspect`, `replay` and `view` read it.")
-    if version is not None and version > VERSION:
-        problem = f"a recording of version {version}"
-        raise BadFile(path, problem, f"version {VERSION} at most", "Use the newer version of the harness that made it.")
+    if version is not None and version > POSES_VERSION:
+        problem, known = f"a recording of version {version}", f"version {POSES_VERSION} at most"
+        raise BadFile(path, problem, known, "Use the newer version of the harness that made it.")
     if (
         version is None
         and not FILE_HEADER.startswith(data)

@@ -22,11 +22,11 @@ def read_marker_poses(path: Path, unit_m: float | None = None) -> PoseLog:
         raise BadFile(path, found, "three or more for each body", "Label them NAME_1, NAME_2, NAME_3.")
     times_s = np.arange(len(markers)) / markers.rate_hz
     poses, findings = {}, []
-    for name, found in clusters.items():
-        position_m, quaternion, residual_m = fit_rigid_body(path, name, markers.position_m[:, found])
+    for name, columns in clusters.items():
+        position_m, quaternion, residual_m = fit_rigid_body(path, name, markers.position_m[:, columns])
         seen = np.isfinite(position_m).all(axis=1)
         poses[name] = times_s[seen], position_m[seen], quaternion[seen]
-        value = f"{len(found)} markers that fit a rigid body to {1e3 * residual_m:.2g} mm (RMS)"
+        value = f"{len(columns)} markers that fit a rigid body to {1e3 * residual_m:.2g} mm (RMS)"
         findings.append(FileFinding(f"body {name}", value, "their labels"))
     findings.append(FileFinding("rate", f"{markers.rate_hz:g} Hz", "the file's header"))
     findings.append(FileFinding("length unit", f"{markers.unit_m:g} m", markers.unit_evidence))
