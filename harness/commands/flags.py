@@ -1,6 +1,7 @@
 """Flags and arguments that verbs of the command line share, their parsers, and flags that verbs had once."""
 
 import argparse
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -242,6 +243,28 @@ def positive_float(text: str) -> float:
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text!r} is not a positive number")
     return value
+
+
+def share(text: str) -> float:
+    """Read a share above 0, up to 1."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no share above 0, up to 1")
+    return value
+
+
+def parse_pair(text: str) -> tuple[float, float]:
+    """Two numbers of 0 or more, for argparse."""
+    try:
+        first, second = (float(word) for word in text.split(","))
+    except ValueError:
+        first = second = math.nan
+    if not (0.0 <= first < math.inf and 0.0 <= second < math.inf):
+        raise argparse.ArgumentTypeError(f"{text!r} is no pair of numbers, such as 0.2,0.1")
+    return first, second
 
 
 def split_list(text: str | None) -> list[str]:

@@ -12,7 +12,6 @@ from harness.commands.flags import (
 )
 from harness.commands.output import print_result
 from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags
-from harness.core.file_kind import file_kind
 from harness.core.units import parse_length_unit
 from harness.errors import Outcome
 
@@ -75,10 +74,8 @@ def run_inspect(args: argparse.Namespace) -> Outcome:
 
 
 def _is_of_poses(path: Path) -> bool:
-    """Whether a file is no motion and no constellation, by its name, and holds poses or text of no known kind."""
+    """Whether the name of a file is neither that of motion nor that of a constellation."""
     from harness.mocap import CLIP_FORMATS
-    from harness.stream.recording import is_pose_file
 
     others = (*(f".{kind}" for kind in (*CLIP_FORMATS, "asf")), CONSTELLATION_SUFFIX)
-    unknown = path.is_file() and not file_kind(path)
-    return path.suffix.lower() not in others and (unknown or is_pose_file(path))
+    return path.suffix.lower() not in others

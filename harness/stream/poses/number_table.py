@@ -34,7 +34,6 @@ _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", 
 _FORMS = ((",", "."), (";", "."), ("\t", "."), (None, "."), (";", ","), ("\t", ","), (None, ","))
 """Separators (None: blanks) and decimal signs; the first of equally good ones counts."""
 _SEPARATOR_NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
-_EMPTY_CELL = {sign: re.compile(rf"(?:^|(?<={sign}))[ ]*(?={sign}|$)", re.MULTILINE) for sign in ",;\t"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +116,7 @@ def _read_beginning(path: Path) -> tuple[str, bool]:
         utf16 = file.encoding == "utf-16"
     if "\0" in text or not text.strip():
         found = "binary data" if "\0" in text else "an empty file"
-        raise wrong_file(path, found, EXPECTED_FILE, "Is it the right file?")
+        raise wrong_file(path, found, EXPECTED_FILE, "Check the path.")
     return text, utf16
 
 
@@ -220,23 +219,37 @@ class _RowReader:
         """The numbers (N, C) and the codes of the names (N,) in whole lines."""
         self.ends_whole = not (last and text)
         plain = text.replace(",", ".") if self._head.decimal == "," else text
-        for fill in (False, True):
-            filled = self._fill(plain) if fill else plain
-            lines = [line for line in filled.split("\n") if line and not line.isspace()]
-            if not lines:
-                return np.empty((0, len(self._columns))), np.empty(0, dtype=np.int64)
-            if (numbers := self._load(filled, lines)) is not None:
-                return numbers, self._codes(lines)
-        return self._read_lines(first_line, text, last)
+        lines = [line for line in plain.split("\n") if line and not line.isspace()]
+        if not lines:
+            return np.empty((0, len(self._columns))), np.empty(0, dtype=np.int64)
+        numbers, comments = self._load(lines), 0
+        if numbers is None:
+            filled = [line for line in self._fill("\n".join(lines)).split("\n") if not _COMMENT.match(line)]
+            numbers, comments, lines = self._load(filled), len(lines) - len(filled), filled
+        if numbers is None:
+            return self._read_lines(first_line, text, last)
+        if comments:
+            self.left_out["comment lines"] += comments
+        return numbers, self._codes(lines)
 
     def _fill(self, text: str) -> str:
-        """The text with `nan` in empty cells."""
-        return text if self._head.separator is None else _EMPTY_CELL[self._head.separator].sub("nan", text)
+        """The text with `nan` in empty cells, and without quotes."""
+        text, sign = text.replace('"', ""), self._head.separator
+        if sign is None:
+            return text
+        for empty, filled in ((sign + sign, f"{sign}nan{sign}"),) * 2 + (
+            (f"{sign}\n", f"{sign}nan\n"),
+            (f"\n{sign}", f"\nnan{sign}"),
+        ):
+            text = text.replace(empty, filled)
+        return f"{'nan' if text.startswith(sign) else ''}{text}{'nan' if text.endswith(sign) else ''}"
 
-    def _load(self, text: str, lines: list[str]) -> Floats | None:
+    def _load(self, lines: list[str]) -> Floats | None:
         """The numbers of lines that all have the form of the table; None if one has not."""
         separator, columns = self._head.separator, self._head.columns
-        if '"' in text or (separator is not None and text.count(separator) != (columns - 1) * len(lines)):
+        if not lines:
+            return np.empty((0, len(self._columns)))
+        if separator is not None and not all(line.count(separator) == columns - 1 for line in lines):
             return None
         every = separator is None and not self._head.text_columns  # then the number of cells is checked
         try:

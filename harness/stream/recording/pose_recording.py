@@ -21,7 +21,7 @@ from harness.core.file_kind import POSES_KIND, file_kind
 from harness.core.files import atomic_path, require_writable
 from harness.core.input_file import open_input_file, read_input_file
 from harness.errors import BadFile, BadInput, HarnessError
-from harness.stream.poses.number_table import read_head
+from harness.stream.poses.number_table import EXPECTED_FILE, read_head
 from harness.stream.poses.options import PoseFileOptions
 from harness.stream.poses.pose_file import read_pose_log
 from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
@@ -77,7 +77,7 @@ def open_poses(paths: Sequence[Path], options: PoseFileOptions | None = None) ->
 
 def is_pose_recording(path: Path) -> bool:
     """Whether a file begins as a recording of poses. Raises BadFile for one that cannot be read."""
-    with open_input_file(path, EXPECTED_POSES, MAX_BYTES) as file:
+    with open_input_file(path, EXPECTED_FILE, MAX_BYTES) as file:
         return read_version(file.read(len(POSES_HEADER))) == POSES_VERSION
 
 
