@@ -254,6 +254,7 @@ def _print_poses(args: argparse.Namespace, writer: "RecordingWriter", line: Mapp
         text = f"{args.file}: stopped before a pose was recorded into it"
         outcome = Outcome.INTERRUPTED if line.get("interrupted") else Outcome.NOT_COMPARABLE
     counted = {"reconnects": "reconnects", "copies": "redundant reports", "clock_resets": "resets of its clock"}
+    counted["lost"] = "messages lost by UDP"
     counted["left_out"] = "poses left out that were not later than the one before"
     text += "".join(f", {line[name]} {words}" for name, words in counted.items() if line.get(name))
     following = ["inspect", args.file] if args.file.exists() else []

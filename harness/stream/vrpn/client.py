@@ -83,6 +83,8 @@ class VrpnTracker(OpenTracker):
         self._address = TrackerAddress.parse(port)
         self._lock, self._sessions, self._trouble = threading.RLock(), 0, "not streaming"
         self._frames_begun = self._lost = False
+        self._lost_messages = 0
+        """Messages that UDP has lost in earlier connections."""
         self._seen_s = self._quiet_s = self._monotonic_s()
         """Times of the latest report, and of the latest byte or ping [s]."""
         self._pinged = False
@@ -130,9 +132,10 @@ class VrpnTracker(OpenTracker):
     @property
     def counts(self) -> dict[str, int]:
         """Numbers of `frames`, `records`, `copies` (redundant reports), reports of `other_sensors`, `clock_resets`,
-        `reconnects`, and `out_of_range`, which is 0.
+        `reconnects`, messages that UDP has `lost`, and `out_of_range`, which is 0.
         """
-        return self._reader.counts | {"reconnects": max(self._sessions - 1, 0), "out_of_range": 0}
+        lost = self._lost_messages + (0 if self._line is None else self._line.lost_messages)
+        return self._reader.counts | {"reconnects": max(self._sessions - 1, 0), "lost": lost, "out_of_range": 0}
 
     @property
     def start_unix_s(self) -> float:
@@ -148,15 +151,19 @@ class VrpnTracker(OpenTracker):
         """Leave the server until frames are read: it waits for a client that does not read, and so do its others."""
         with self._lock:
             self._heard, self._sessions = [], 0
-            if self._line is not None:
-                self._line.close()
-                self._line = None
+            self._leave()
 
     def close(self) -> None:
         self._closing.set()
         with self._lock:
-            if self._line is not None:
-                self._line.close()
+            self._leave()
+
+    def _leave(self) -> None:
+        """Close the connection, if there is one."""
+        if self._line is not None:
+            self._lost_messages += self._line.lost_messages
+            self._line.close()
+            self._line = None
 
     def _open(self) -> None:
         """Connect, and listen until the sensors and their rate are known."""
@@ -298,9 +305,7 @@ class VrpnTracker(OpenTracker):
         self._lost = True
         if self._closing.is_set():
             raise DriverClosed from error
-        if self._line is not None:
-            self._line.close()
-            self._line = None
+        self._leave()
         if isinstance(error, MalformedMessage):
             self._tell("garbage", "garbage", f"the server sends what is no message of VRPN: {error.problem}")
         else:

@@ -1,4 +1,8 @@
-"""A TCP connection to a VRPN server, for the messages of one of its trackers."""
+"""A connection to a VRPN server, for the messages of one of its trackers.
+
+The client connects by TCP, and everything comes that way. Of `udp://` it asks the server to connect to it, as VRPN's
+own programs do; a server then offers UDP, and sends reports so. Source: vrpn_Connection.C of github.com/vrpn/vrpn.
+"""
 
 import select
 import socket
@@ -7,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from harness.core.network import VRPN_PREFIX, resolve_host
 from harness.errors import BadInput, HarnessError, shorten
@@ -18,12 +23,14 @@ from harness.stream.vrpn.messages import (
     POSE,
     SENDER_DESCRIPTION,
     TYPE_DESCRIPTION,
+    UDP_DESCRIPTION,
     MessageReader,
     NameTable,
     PoseReport,
     VrpnMessage,
     decode_pose,
     encode_description,
+    split_datagram,
 )
 
 _EXAMPLE = "Write vrpn:TRACKER@HOST[:PORT], such as vrpn:Tracker0@127.0.0.1:3883."
@@ -42,19 +49,22 @@ class TrackerAddress:
     tracker: str
     host: str
     port: int = DEFAULT_PORT
+    udp: bool = False
+    """Whether reports come by UDP where the server offers it."""
 
     @classmethod
     def parse(cls, text: str) -> "TrackerAddress":
         """Split such a text; BadInput for another one."""
         tracker, at, place = text.removeprefix(VRPN_PREFIX).rpartition("@")
-        place = place.removeprefix("tcp://").removeprefix("tcp:")  # as VRPN's own programs write it
+        udp = place.startswith("udp://")
+        place = place.removeprefix("udp://" if udp else "tcp://")  # VRPN's own programs write the latter
         host, colon, number = place.rpartition(":") if not place.endswith("]") else (place, "", "")
         if not colon:
             host, number = place, str(DEFAULT_PORT)
         sound = number.isascii() and number.isdecimal() and len(number) <= 5 and 0 < int(number) < 65536
-        if not (at and tracker and host and sound and tracker.isprintable()):
+        if not (at and tracker and host and sound and tracker.isprintable()) or "/" in host:
             raise BadInput(f"Port {shorten(text)}: no tracker of a VRPN server.", _EXAMPLE)
-        return cls(tracker, host.strip("[]"), int(number))
+        return cls(tracker, host.strip("[]"), int(number), udp)
 
 
 class ConnectionLost(HarnessError):
@@ -75,9 +85,13 @@ class ServerConnection:
         self.senders = NameTable()
         self.answered = False
         """Whether the tracker has answered a ping: the server has it."""
-        self.received_bytes = 0
+        self.received_bytes = self.lost_messages = 0
+        """Number of bytes so far, and of messages that UDP has lost."""
+        self._datagrams: socket.socket | None = None
+        """What receives reports by UDP, after the server has offered it."""
+        self._sequence: int | None = None
         self._address, self._types, self._reader = address, NameTable(), MessageReader()
-        self._socket = _connect(address, timeout_s)
+        self._socket = _be_connected(address, timeout_s) if address.udp else _connect(address, timeout_s)
         now_us = time.time_ns() // 1000
         names = [encode_description(SENDER_DESCRIPTION, 0, address.tracker, now_us)]
         names += [encode_description(TYPE_DESCRIPTION, number, name, now_us) for number, name in enumerate(_TYPES)]
@@ -99,25 +113,50 @@ class ServerConnection:
 
     def receive(self, timeout_s: float) -> Iterator[PoseReport]:
         """Yield the tracker's reports that are there, after a wait of at most `timeout_s` for bytes [s]."""
-        try:
-            if not select.select([self._socket], [], [], timeout_s)[0]:
-                return
-            data = self._socket.recv(_READ_BYTES)
-        except (OSError, ValueError) as error:
-            raise ConnectionLost(f"the connection is gone ({error})") from error
-        if not data:
-            raise ConnectionLost("the server has closed the connection")
-        self.received_bytes += len(data)
-        for message in self._reader.feed(data):
+        for message in self._messages(timeout_s):
             if message.type == SENDER_DESCRIPTION:
                 self.senders.add(message)
             elif message.type == TYPE_DESCRIPTION:
                 self._types.add(message)
+            elif message.type == UDP_DESCRIPTION and self._address.udp:
+                self._accept_udp()
             elif message.type >= 0 and self.senders[message.sender] == self._address.tracker:
                 kind = self._types[message.type]
                 self.answered |= kind == PONG
                 if kind == POSE:
                     yield decode_pose(message)
+
+    def _messages(self, timeout_s: float) -> Iterator[VrpnMessage]:
+        ends = [self._socket] if self._datagrams is None else [self._socket, self._datagrams]
+        try:
+            ready = select.select(ends, [], [], timeout_s)[0]
+            packets = [] if self._datagrams not in ready else [self._datagrams.recvfrom(_READ_BYTES)]
+            data = self._socket.recv(_READ_BYTES) if self._socket in ready else None
+        except (OSError, ValueError) as error:
+            raise ConnectionLost(f"the connection is gone ({error})") from error
+        if data == b"":
+            raise ConnectionLost("the server has closed the connection")
+        if data:
+            self.received_bytes += len(data)
+            yield from self._reader.feed(data)
+        for packet, (host, *_) in packets:
+            if host == self._socket.getpeername()[0]:
+                self.received_bytes += len(packet)
+                for message in split_datagram(packet):
+                    if self._sequence is not None:
+                        self.lost_messages += message.sequence - self._sequence - 1
+                    self._sequence = message.sequence
+                    yield message
+
+    def _accept_udp(self) -> None:
+        """Tell the server where it can send reports by UDP."""
+        if self._datagrams is not None:
+            return
+        host = self._socket.getsockname()[0]
+        self._datagrams = socket.socket(self._socket.family, socket.SOCK_DGRAM)
+        self._datagrams.bind((host, 0))
+        port = self._datagrams.getsockname()[1]
+        self._send(VrpnMessage(UDP_DESCRIPTION, port, time.time_ns() // 1000, host.encode() + b"\0").encode())
 
     def _send(self, data: bytes) -> None:
         try:
@@ -128,16 +167,14 @@ class ServerConnection:
     def close(self) -> None:
         """Close the connection; may be called twice."""
         self._socket.close()
+        if self._datagrams is not None:
+            self._datagrams.close()
 
 
 def _connect(address: TrackerAddress, timeout_s: float) -> socket.socket:
     """A connection to the first address of the host that answers; ConnectionLost with the first reason if none does."""
     reasons = []
-    try:
-        resolved = resolve_host(address.host, address.port, socket.SOCK_STREAM)
-    except (OSError, UnicodeError) as error:
-        raise ConnectionLost(f"there is no host called {address.host}") from error
-    for family, place in resolved:
+    for family, place in _resolve(address, socket.SOCK_STREAM):
         opened = socket.socket(family, socket.SOCK_STREAM)
         opened.settimeout(timeout_s)
         try:
@@ -148,7 +185,40 @@ def _connect(address: TrackerAddress, timeout_s: float) -> socket.socket:
             reason = f"nothing listens at {address.host}, port {address.port}" if refused else str(error)
             reasons.append(f"{address.host} does not answer" if isinstance(error, TimeoutError) else reason)
         else:
-            opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            opened.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET_ON_CLOSE)
-            return opened
+            return _prepare(opened, timeout_s)
     raise ConnectionLost(reasons[0])
+
+
+def _be_connected(address: TrackerAddress, timeout_s: float) -> socket.socket:
+    """The connection that the server makes to this computer when a packet asks it to. Raises ConnectionLost."""
+    family, place = _resolve(address, socket.SOCK_DGRAM)[0]
+    with socket.socket(family, socket.SOCK_DGRAM) as asking:
+        try:
+            asking.connect(place)
+            host = asking.getsockname()[0]
+            with socket.create_server((host, 0), family=family) as listening:
+                listening.settimeout(timeout_s)
+                asking.send(f"{host} {listening.getsockname()[1]}\0".encode())
+                while True:
+                    opened, (peer, *_) = listening.accept()
+                    if peer == place[0]:
+                        return _prepare(opened, timeout_s)
+                    opened.close()
+        except TimeoutError as error:
+            raise ConnectionLost(f"{address.host} does not connect to this computer, which it was asked to") from error
+        except OSError as error:
+            raise ConnectionLost(f"{address.host} cannot be asked ({error.strerror or error})") from error
+
+
+def _resolve(address: TrackerAddress, kind: socket.SocketKind) -> list[tuple[socket.AddressFamily, Any]]:
+    try:
+        return resolve_host(address.host, address.port, kind)
+    except (OSError, UnicodeError) as error:
+        raise ConnectionLost(f"there is no host called {address.host}") from error
+
+
+def _prepare(opened: socket.socket, timeout_s: float) -> socket.socket:
+    opened.settimeout(timeout_s)
+    opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    opened.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET_ON_CLOSE)
+    return opened

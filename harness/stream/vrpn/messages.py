@@ -15,7 +15,7 @@ Source: Format_Of_Protocol.txt and vrpn_Connection.C of github.com/vrpn/vrpn; vr
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from harness.errors import HarnessError
 
@@ -24,7 +24,8 @@ COOKIE = b"vrpn: ver. 07.35  0".ljust(24, b"\0")
 """Version 7.35, and 0 for no log files at the other side."""
 _COOKIE_START = b"vrpn: ver. 07."
 """Programs of one major version understand each other."""
-SENDER_DESCRIPTION, TYPE_DESCRIPTION = -1, -2
+SENDER_DESCRIPTION, TYPE_DESCRIPTION, UDP_DESCRIPTION = -1, -2, -3
+"""Types of the protocol. The last one offers UDP: its sender is the port, its payload the address in words."""
 POSE, PING, PONG = "vrpn_Tracker Pos_Quat", "vrpn_Base ping_message", "vrpn_Base pong_message"
 """Names of the types of message that are used here."""
 MAX_PAYLOAD_BYTES = 64_000
@@ -59,6 +60,8 @@ class VrpnMessage:
     time_us: int
     """Time of the message since 1970 [us]."""
     payload: bytes = b""
+    sequence: int = field(default=0, compare=False)
+    """Number of the message among those that its sender sent the same way."""
 
     def encode(self, sequence: int = 0) -> bytes:
         """The bytes of the message."""
@@ -122,6 +125,11 @@ class MessageReader:
         self.greeted = False
         """Whether the cookie has arrived."""
 
+    @property
+    def waiting_bytes(self) -> int:
+        """Number of bytes of a message that is not complete."""
+        return len(self._waiting)
+
     def feed(self, data: bytes) -> Iterator[VrpnMessage]:
         """Yield the messages that become complete."""
         self._waiting += data
@@ -136,7 +144,7 @@ class MessageReader:
         offset = 0
         try:
             while len(self._waiting) - offset >= _HEADER.size:
-                length, seconds, micros, sender, kind, _ = _HEADER.unpack_from(self._waiting, offset)
+                length, seconds, micros, sender, kind, sequence = _HEADER.unpack_from(self._waiting, offset)
                 if not _HEADER.size <= length <= _HEADER.size + MAX_PAYLOAD_BYTES:
                     raise MalformedMessage(f"a message of {length:,} bytes, at most {MAX_PAYLOAD_BYTES:,} are allowed")
                 end = offset + length
@@ -144,9 +152,19 @@ class MessageReader:
                     break
                 payload = bytes(self._waiting[offset + _HEADER.size : end])
                 offset = end + -length % _ALIGNMENT
-                yield VrpnMessage(kind, sender, 1_000_000 * seconds + micros, payload)
+                yield VrpnMessage(kind, sender, 1_000_000 * seconds + micros, payload, sequence)
         finally:
             del self._waiting[:offset]
+
+
+def split_datagram(data: bytes) -> list[VrpnMessage]:
+    """The messages of a UDP packet, which holds whole ones alone. Raises MalformedMessage."""
+    reader = MessageReader()
+    reader.greeted = True
+    messages = list(reader.feed(data))
+    if reader.waiting_bytes:
+        raise MalformedMessage(f"a packet that ends within a message, after {len(messages)} whole ones")
+    return messages
 
 
 class NameTable:

@@ -4,8 +4,9 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -22,9 +23,13 @@ from harness.stream.vrpn.messages import (
     POSE,
     SENDER_DESCRIPTION,
     TYPE_DESCRIPTION,
+    UDP_DESCRIPTION,
+    MalformedMessage,
+    MessageReader,
     PoseReport,
     VrpnMessage,
     encode_description,
+    split_datagram,
 )
 from harness.testing.stream_checks import check_stream
 from tests.stream.vrpn.feeder import QUICK, TRACKER, Feeder, fed_server, port_of, scripted_server, wait_until_closed
@@ -116,6 +121,7 @@ def test_contradictory_names_are_refused() -> None:
         ("vrpn:Tracker0@lab:3884", TrackerAddress("Tracker0", "lab", 3884)),
         ("vrpn:a@b@10.0.0.1:1", TrackerAddress("a@b", "10.0.0.1", 1)),
         ("vrpn:Tracker0@tcp://lab:3884", TrackerAddress("Tracker0", "lab", 3884)),
+        ("vrpn:Tracker0@udp://lab:3884", TrackerAddress("Tracker0", "lab", 3884, udp=True)),
         ("vrpn:Tracker0@[::1]", TrackerAddress("Tracker0", "::1", 3883)),
         ("vrpn:Tracker0@[::1]:99", TrackerAddress("Tracker0", "::1", 99)),
     ],
@@ -125,7 +131,17 @@ def test_addresses(text: str, address: TrackerAddress) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["vrpn:", "vrpn:Tracker0", "vrpn:@lab", "vrpn:T@", "vrpn:T@lab:0", "vrpn:T@lab:65536", "vrpn:T@lab:x"]
+    "text",
+    [
+        "vrpn:",
+        "vrpn:Tracker0",
+        "vrpn:@lab",
+        "vrpn:T@",
+        "vrpn:T@lab:0",
+        "vrpn:T@lab:65536",
+        "vrpn:T@lab:x",
+        "vrpn:T@ftp://lab",
+    ],
 )
 def test_what_is_no_address_is_refused(text: str) -> None:
     with pytest.raises(BadInput, match="no tracker of a VRPN server"):
@@ -300,6 +316,69 @@ def test_closing_ends_the_iteration_from_another_thread(fed: Feeder) -> None:
         thread.start()
         assert len(list(frames)) < 1000
         thread.join()
+
+
+@contextmanager
+def udp_server(packets: Callable[[], Iterator[bytes]]) -> Iterator[str]:
+    """A server that connects to a client that asks for it, offers UDP, and sends these packets so."""
+    with socket.socket(type=socket.SOCK_DGRAM) as asked:
+        asked.bind(("127.0.0.1", 0))
+
+        def run() -> None:
+            request, _ = asked.recvfrom(200)
+            host, port = request.rstrip(b"\0").split()
+            with socket.create_connection((host.decode(), int(port)), timeout=10.0) as client:
+                offer = VrpnMessage(UDP_DESCRIPTION, 9, 0, b"127.0.0.1\0").encode()
+                client.sendall(COOKIE + DESCRIPTIONS + offer + offer)
+                reader, answers = MessageReader(), list[VrpnMessage]()
+                while not answers:
+                    answers += [one for one in reader.feed(client.recv(4096)) if one.type == UDP_DESCRIPTION]
+                (answer,) = answers
+                for packet in packets():
+                    asked.sendto(packet, (answer.payload.rstrip(b"\0").decode(), answer.sender))
+                with suppress(ConnectionResetError):
+                    wait_until_closed(client)
+
+        thread = threading.Thread(target=run)
+        thread.start()
+        yield f"vrpn:{TRACKER}@udp://127.0.0.1:{asked.getsockname()[1]}"
+        thread.join()
+
+
+def test_reports_come_by_udp_where_it_is_offered_and_lost_ones_are_counted() -> None:
+    def packets() -> Iterator[bytes]:
+        for n in range(100):
+            report = PoseReport(0, 10_000 * n, (n, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)).encode(1, 4)
+            other = VrpnMessage(3, 4, 0, bytes(8))
+            if n not in (7, 8, 90):  # lost on the way
+                yield report.encode(2 * n) + other.encode(2 * n + 1)
+
+    with udp_server(packets) as port, open_quick(port) as tracker:
+        numbers = [frame.position_m[0, 0] for frame in islice(tracker, 97)]
+        assert numbers == [n for n in range(100) if n not in (7, 8, 90)]
+        assert tracker.counts["lost"] == 6
+        tracker.close()
+        assert tracker.counts["lost"] == 6
+
+
+def test_a_packet_that_is_cut_is_refused() -> None:
+    report = POSES[:88]
+    assert [message.sender for message in split_datagram(report * 2)] == [4, 4]
+    with pytest.raises(MalformedMessage, match="a packet that ends within a message, after 1 whole ones"):
+        split_datagram(report + report[:-8])
+
+
+def test_a_server_that_does_not_connect_back_is_refused() -> None:
+    with socket.socket(type=socket.SOCK_DGRAM) as deaf:
+        deaf.bind(("127.0.0.1", 0))
+        port = f"vrpn:{TRACKER}@udp://127.0.0.1:{deaf.getsockname()[1]}"
+        with pytest.raises(BadInput, match=r"127\.0\.0\.1 does not connect to this computer"):
+            VrpnTracker(port, timing=replace(QUICK, connect_s=0.05))
+
+
+def test_this_server_is_asked_as_any_other(fed: Feeder) -> None:
+    with open_quick(f"vrpn:{TRACKER}@udp://127.0.0.1:{fed.server.port}") as tracker:
+        assert len(list(islice(tracker, 5))) == 5
 
 
 def test_after_a_pause_only_what_comes_then_is_delivered(fed: Feeder) -> None:
