@@ -124,7 +124,7 @@ def _serve_vrpn(
     """Use the emulated device as its driver does, and serve what it reports."""
     from harness.stream import EventCounter
     from harness.stream.is900 import DriverConfig, open_tracker, serve_emulator
-    from harness.stream.vrpn import RelayedStream, open_server
+    from harness.stream.vrpn import RelayedStream, describe_sensors, open_server
 
     with ExitStack() as opened:
         with defer_interrupts():
@@ -135,7 +135,7 @@ def _serve_vrpn(
         )
         events = EventCounter(lambda text: print_status(f"line: {text}"))
         tracker = opened.enter_context(open_tracker(device.name, driver, on_event=events))
-        sensors = ", ".join(f"{sensor} {name}" for sensor, name in enumerate(tracker.stations))
+        sensors = describe_sensors(tracker.stations)
         print_status(f"VRPN: {server.names[0]} with the sensors {sensors} at {tracker.rate_hz:g} Hz; Ctrl-C ends it")
         following = ["harness", "record", f"vrpn:{server.names[0]}", "take.rec"]
         print_status(f"next, in another terminal: {shlex.join(following)}")

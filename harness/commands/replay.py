@@ -93,13 +93,13 @@ def run_replay(args: argparse.Namespace) -> Outcome:
 def _serve_frames(args: argparse.Namespace, stream: "RecordingStream | PoseLogStream") -> Outcome:
     """Serve the frames to VRPN clients, from the first client on."""
     from harness.stream import UnixTimeEstimator
-    from harness.stream.vrpn import RelayedStream, open_server
+    from harness.stream.vrpn import RelayedStream, describe_sensors, open_server
 
     frames = 0
     with ExitStack() as opened:
         with defer_interrupts():
             server = opened.enter_context(open_server(args.vrpn, anywhere=args.anywhere, log=print_status))
-        sensors = ", ".join(f"{sensor} {name}" for sensor, name in enumerate(stream.stations))
+        sensors = describe_sensors(stream.stations)
         print_status(f"VRPN: {server.names[0]} with the sensors {sensors}; waits for a client, Ctrl-C ends it")
         outcome = Outcome.INTERRUPTED
         with suppress(KeyboardInterrupt):

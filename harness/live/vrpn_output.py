@@ -8,7 +8,7 @@ import numpy as np
 from harness.core.estimate import Status
 from harness.live.pose import LivePose, SessionSetup
 from harness.stream import OpenTracker
-from harness.stream.vrpn import PoseReport, RelayedStream, open_server
+from harness.stream.vrpn import PoseReport, RelayedStream, describe_sensors, open_server
 
 _JOINTS = "-joints"
 
@@ -24,7 +24,7 @@ class VrpnOutput:
         self._server = open_server(place, ("", _JOINTS), anywhere=anywhere, log=say)
         self._wall_ahead_s = time.time() - time.monotonic()
         stations, joints = self._server.names
-        named = ", ".join(f"{sensor} {station}" for sensor, station in enumerate(setup.stations))
+        named = describe_sensors(setup.stations)
         bones = setup.skeleton.names
         self.description = (
             f"VRPN: {stations} with the sensors {named}; {joints} with the joints from 0 {bones[0]} to "

@@ -1,6 +1,6 @@
 """Frames of a stream as reports of a VRPN server."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -21,6 +21,11 @@ def frame_reports(frame: TrackerFrame, measured_unix_s: Floats) -> list[PoseRepo
         PoseReport(row, round(1e6 * float(measured_unix_s[row])), tuple(positions_m[row]), tuple(quaternions[row]))
         for row in rows
     ]
+
+
+def describe_sensors(stations: Sequence[str]) -> str:
+    """Sensors with the names of their stations, where these are no numbers: `0 head, 1 torso`."""
+    return ", ".join(name if name == str(sensor) else f"{sensor} {name}" for sensor, name in enumerate(stations))
 
 
 class RelayedStream:

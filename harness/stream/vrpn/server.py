@@ -344,4 +344,5 @@ def _bind_error(host: str, port: int, error: Exception) -> BadInput:
     if getattr(error, "errno", None) == errno.EADDRINUSE:
         advice = "Close that program, or name another port: --vrpn NAME@127.0.0.1:3884."
         return BadInput(f"VRPN at {host}:{port}: another program listens there.", advice)
-    return BadInput(f"VRPN at {host}:{port}: {error}.", "Name an address of this computer, such as 127.0.0.1:3883.")
+    reason = getattr(error, "strerror", None) or error
+    return BadInput(f"VRPN at {host}:{port}: {reason}.", "Name an address of this computer, such as 127.0.0.1:3883.")

@@ -8,7 +8,7 @@ import numpy as np
 from harness.stream.frame import TrackerFrame
 from harness.stream.vrpn.client import VrpnTracker
 from harness.stream.vrpn.messages import PoseReport
-from harness.stream.vrpn.relay import RelayedStream, frame_reports
+from harness.stream.vrpn.relay import RelayedStream, describe_sensors, frame_reports
 from harness.stream.vrpn.server import VrpnServer
 from tests.stream.vrpn.feeder import QUICK, fed_server, port_of
 
@@ -23,6 +23,10 @@ def test_only_whole_poses_become_reports() -> None:
     assert frame_reports(frame, 1.7e9 + measured) == [
         PoseReport(0, 1_700_000_001_000_000, (0.0, 1.0, 2.0), (0.6, 0.0, 0.8, 0.0))
     ]
+
+
+def test_sensors_have_the_names_of_stations() -> None:
+    assert describe_sensors(("head", "1", "torso")) == "0 head, 1, 2 torso"
 
 
 def test_a_relayed_tracker_is_the_same_tracker_again() -> None:

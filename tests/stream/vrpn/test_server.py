@@ -198,6 +198,11 @@ def test_a_place_that_is_none_is_refused(text: str) -> None:
         parse_served_name(text)
 
 
+def test_an_address_of_another_computer_is_refused() -> None:
+    with pytest.raises(BadInput, match=r"VRPN at 192\.0\.2\.1:0: [A-Z][a-z ]+\. Name an address of this computer"):
+        open_server("Head@192.0.2.1:0", anywhere=True)
+
+
 def test_other_computers_need_to_be_asked_for() -> None:
     with pytest.raises(BadInput, match=r"0\.0\.0\.0 is reachable from other computers"):
         open_server("Head@0.0.0.0:0")
