@@ -5,13 +5,16 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 
 from harness.stream.vrpn.client import VrpnTiming
 from harness.stream.vrpn.messages import PoseReport
 from harness.stream.vrpn.server import VrpnServer
 
 TRACKER, PERIOD_S = "Tracker0", 0.01
-QUICK = VrpnTiming(connect_s=1.0, silent_s=0.3, measure_s=0.2, retry_s=0.02, poll_s=0.02)
+QUICK = VrpnTiming(connect_s=10.0, silent_s=10.0, measure_s=0.5, retry_s=0.02, poll_s=0.02)
+IMPATIENT = replace(QUICK, silent_s=0.3)
+"""For servers that say nothing."""
 
 
 class Feeder:
