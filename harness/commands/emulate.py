@@ -81,7 +81,8 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
         raise BadInput("--anywhere with --pty.", "--anywhere is for --tcp and --udp: leave it out.")
     udp = None if args.udp is None else parse_udp_address(args.udp, args.anywhere)
     if args.check_baud and not args.pty:
-        raise BadInput("--check-baud without --pty.", "Other connections have no baud rate: leave it out.")
+        advice = "Only a pseudo terminal has a baud rate; --check-baud is for --pty."
+        raise BadInput(f"--check-baud with {'--tcp' if args.tcp else '--vrpn'}.", advice)
     if args.vrpn and args.udp:
         raise BadInput("--udp with --vrpn.", "Give --tcp or --pty for a device that also broadcasts.")
     stations = parse_device_stations(args.stations)

@@ -155,7 +155,7 @@ def line_options(args: argparse.Namespace, port: str) -> dict[str, Any]:
     if args.baud is not None and "://" in port:
         raise BadInput(f"--baud with {port}.", "It is for a serial port: leave it out.")
     if port.startswith(("udp:", VRPN_PREFIX)):
-        advice = "It needs commands, and this port carries none: leave it out."
+        advice = f"It needs commands, and {'UDP' if port.startswith('udp:') else 'VRPN'} carries none: leave it out."
         refuse_flags(args, sorted(LINE_FLAGS), f"with {port}", advice)
     options = {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
     if not port.startswith(VRPN_PREFIX) and (characters := parse_characters(args.stations)):

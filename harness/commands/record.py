@@ -212,7 +212,7 @@ def _record_line(args: argparse.Namespace) -> Outcome:
         advice = "--send sets nothing but what it names: leave it out."
         refuse_flags(args, ("stations", *settings), "with --send", advice)
     if args.port.startswith(("udp:", VRPN_PREFIX)):
-        advice = "This port carries no commands: name the serial line."
+        advice = f"{'UDP' if args.port.startswith('udp:') else 'VRPN'} carries no commands: name the serial line."
         refuse_flags(args, ("serve", "send"), f"with {args.port}", advice)
     if args.send is not None:
         check_commands(args.send, args.allow_writes)

@@ -91,8 +91,8 @@ def test_a_recording_is_served_as_it_was(recorded: tuple[str, str, Path]) -> Non
 def test_flags_of_other_uses_are_refused(tmp_path: Path, command: Command) -> None:
     port, path = "vrpn:Tracker0@127.0.0.1:1", tmp_path / "a.rec"
     assert "nothing listens at 127.0.0.1, port 1" in command("record", port, path, code=2).err
-    assert "It needs commands" in command("record", port, path, "--baud", "9600", code=2).err.replace("--baud with", "")
-    assert "This port carries no commands" in command("record", port, path, "--serve", tmp_path / "l", code=2).err
+    assert "needs commands, and VRPN carries none" in command("record", port, path, "--baud", "9600", code=2).err
+    assert "VRPN carries no commands" in command("record", port, path, "--serve", tmp_path / "l", code=2).err
     assert "no tracker of a VRPN server" in command("record", "vrpn:Tracker0", path, code=2).err
     assert "--anywhere without --vrpn" in command("replay", path, "--anywhere", code=2).err
     assert "--frames with --vrpn" in command("replay", path, "--vrpn", "T", "--frames", code=2).err
