@@ -49,6 +49,8 @@ class VrpnTiming:
     """Time without a report after which the server is pinged, and without any byte after which it is given up."""
     measure_s: float = 1.0
     """Time for which reports are gathered to find the sensors and their rate."""
+    longest_measure_s: float = 5.0
+    """Longest such time, for sensors that report rarely."""
     retry_s: float = 0.25
     """Interval between two attempts to reconnect."""
     poll_s: float = 0.05
@@ -180,14 +182,17 @@ class VrpnTracker(OpenTracker):
         self._seen_s = self._quiet_s = self._monotonic_s()
 
     def _listen(self, line: ServerConnection) -> list[tuple[PoseReport, float]]:
-        """The reports of `measure_s`, and when each was received [s]; the first must come within `silent_s`."""
+        """The first reports, and when each was received [s]."""
         reports: list[tuple[PoseReport, float]] = []
+        counts = Counter[int]()
         until_s = self._monotonic_s() + self._timing.silent_s
         while (left_s := until_s - self._monotonic_s()) > 0.0:
             new = [(report, self._monotonic_s()) for report in line.receive(min(left_s, self._timing.poll_s))]
-            if new and not reports:
-                until_s = self._monotonic_s() + self._timing.measure_s
+            counts.update(report.sensor for report, _ in new)
             reports += new
+            if reports:
+                known = self.config.rate_hz is not None or max(counts.values()) >= _FEWEST_REPORTS
+                until_s = reports[0][1] + (self._timing.measure_s if known else self._timing.longest_measure_s)
         if reports:
             return reports
         if not line.greeted:
@@ -225,7 +230,7 @@ class VrpnTracker(OpenTracker):
         )
         distinct = sorted(set(times_us))
         if len(distinct) < _FEWEST_REPORTS:
-            what = f"only {len(distinct)} reports of a sensor in {self._timing.measure_s:g} s"
+            what = f"only {len(distinct)} reports of a sensor in {self._timing.longest_measure_s:g} s"
             raise BadInput(f"Port {self.port}: {what}, too few to measure the rate.", "Give it: --rate HZ.")
         return 1e6 * (len(distinct) - 1) / (distinct[-1] - distinct[0])
 

@@ -12,8 +12,8 @@ from harness.stream.vrpn.messages import PoseReport
 from harness.stream.vrpn.server import VrpnServer
 
 TRACKER, PERIOD_S = "Tracker0", 0.01
-QUICK = VrpnTiming(connect_s=10.0, silent_s=10.0, measure_s=0.5, retry_s=0.02, poll_s=0.02)
-IMPATIENT = replace(QUICK, silent_s=0.3)
+QUICK = VrpnTiming(connect_s=10.0, silent_s=10.0, measure_s=0.3, longest_measure_s=10.0, retry_s=0.02, poll_s=0.02)
+IMPATIENT = replace(QUICK, silent_s=0.3, longest_measure_s=0.5)
 """For servers that say nothing."""
 
 
