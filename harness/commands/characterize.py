@@ -6,14 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.commands.flags import (
+    FASTRAK_PREFIX,
     LINE_FLAGS,
     Verbs,
     add_line_flags,
     add_verb,
-    line_options,
     parse_device_names,
     positive_float,
     refuse_flags,
+    tracker_config,
 )
 from harness.commands.output import print_result, print_status, recording_note, show_progress, this_command
 from harness.commands.unit_results import UnitOptions, add_unit_flags, departure_content, read_expected, write_unit
@@ -79,7 +80,8 @@ def _parse_pair(text: str | None) -> tuple[str, str] | None:
 def _is_port(source: str) -> bool:
     """Whether a source is the name of a port: an address, a device of the system, or COM3."""
     path = Path(source)
-    return "://" in source or path.is_char_device() or (source.upper().startswith("COM") and source[3:].isdecimal())
+    named = "://" in source or source.startswith(FASTRAK_PREFIX)
+    return named or path.is_char_device() or (source.upper().startswith("COM") and source[3:].isdecimal())
 
 
 def _capture_of(args: argparse.Namespace) -> Path:
@@ -95,7 +97,6 @@ def _capture_of(args: argparse.Namespace) -> Path:
 def _record_stretches(args: argparse.Namespace) -> Path:
     """Record the stretches of a device, or the rest of them; the recording's path."""
     from harness.measure import events_for_precision
-    from harness.stream.is900 import DriverConfig
     from harness.stream.recording import capture_stretches, finished_stretches
 
     path: Path = args.out.with_suffix(".rec")
@@ -104,8 +105,8 @@ def _record_stretches(args: argparse.Namespace) -> Path:
         f"A rate known to 20 % takes {events_for_precision(0.2)} events: 17 minutes at rest of six stations with one "
         f"event a minute each. This capture rests for {minutes:g} minutes. Stop with Ctrl-C; the same command goes on."
     )
-    stations = None if args.stations is None else tuple(parse_device_names(args.stations))
-    config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args, args.source))
+    stations = None if args.stations is None else parse_device_names(args.stations)
+    config = tracker_config(args, args.source, stations)
     with recording_note(path, ", and the same command resumes."):
         capture_stretches(
             args.source,

@@ -13,11 +13,11 @@ from harness.commands.flags import (
     Verbs,
     add_line_flags,
     add_verb,
-    line_options,
     output_file,
     output_folder,
     positive_float,
     repeat_flags,
+    tracker_config,
 )
 from harness.commands.output import print_caveat, print_result, print_status, show_progress
 from harness.commands.playback_flags import DEVICE_STATIONS_HELP, PlaybackOptions, open_playback, parse_device_stations
@@ -27,8 +27,8 @@ from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 if TYPE_CHECKING:
     from harness.calibrate import CalibrationFile
     from harness.experiment import CalibrationSession, Playback
-    from harness.stream import EventCounter
-    from harness.stream.is900 import DriverConfig, Tracker
+    from harness.stream import EventCounter, TrackerConfig
+    from harness.stream.polhemus import Tracker
     from harness.stream.recording import RecordingSwitch
 
 _CALIBRATION_KINDS = ("exact", "tpose", "poses")
@@ -178,30 +178,28 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     return print_result(args, content, *lines, outcome=outcome, following=following)
 
 
-def _driver_config(args: argparse.Namespace, playback: "Playback") -> "DriverConfig":
+def _driver_config(args: argparse.Namespace, playback: "Playback") -> "TrackerConfig":
     """How the tracker is set up for the stations and the motion of a playback."""
-    from harness.stream.is900 import DriverConfig
-    from harness.stream.is900.codec import position_range_m
+    from harness.stream.polhemus.codec import position_range_m
 
-    options = {"items": playback.tracker.items, **line_options(args, args.port)}
-    reach_m = playback.reach_m if position_range_m(options["items"]) else None  # it takes a simulation
-    stations = tuple(playback.scenario.stations)
-    return DriverConfig(**options, stations=stations, rate_hz=args.rate, reach_m=reach_m)
+    items = args.items or playback.tracker.items
+    reach_m = playback.reach_m if position_range_m(items) else None  # it takes a simulation
+    return tracker_config(args, args.port, tuple(playback.scenario.stations), items=items, reach_m=reach_m)
 
 
 @contextmanager
 def _open_device(
     port: str,
-    config: "DriverConfig",
+    config: "TrackerConfig",
     playback: "Playback",
     events: "EventCounter",
     recorder: "RecordingSwitch | None" = None,
 ) -> "Iterator[Tracker]":
     """Open and set up the tracker; BadInput when its rate is not the scenario's."""
-    from harness.stream.is900 import open_tracker
+    from harness.stream import open_tracker_at
 
     rate_hz = playback.tracker.rate_hz
-    with open_tracker(port, config, observer=recorder, on_event=events) as device:
+    with open_tracker_at(port, config, observer=recorder, on_event=events) as device:
         runs_hz = device.wire.rate_hz
         if abs(runs_hz - rate_hz) > _RATE_TOLERANCE * rate_hz:
             raise BadInput(
@@ -237,7 +235,7 @@ def _guided_calibrations(args: argparse.Namespace, playback: "Playback") -> "dic
 
 
 def _calibrate_performer(
-    port: str, config: "DriverConfig", playback: "Playback", events: "EventCounter", session: "CalibrationSession"
+    port: str, config: "TrackerConfig", playback: "Playback", events: "EventCounter", session: "CalibrationSession"
 ) -> "CalibrationFile":
     """Calibrate by held poses before methods learn, so that they learn on the performer's bone lengths.
 

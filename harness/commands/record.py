@@ -12,11 +12,11 @@ from harness.commands.flags import (
     add_line_flags,
     add_verb,
     is_whole_number,
-    line_options,
     output_link,
     parse_device_names,
     parse_names,
     refuse_flags,
+    tracker_config,
 )
 from harness.commands.output import print_result, print_status, recording_note, show_progress
 from harness.commands.playback_flags import PlaybackOptions, open_playback
@@ -87,7 +87,7 @@ def _record(args: argparse.Namespace) -> Outcome:
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     from harness.mocap.synthetic import stretch_marks
-    from harness.stream.is900 import add_byte_faults, unapplied_kinds
+    from harness.stream.polhemus import add_byte_faults, unapplied_kinds
     from harness.stream.recording import RecordingWriter, record_capture
 
     plan = _plan_note(args)
@@ -134,7 +134,6 @@ def _plan_note(args: argparse.Namespace) -> dict[str, str]:
 
 def _record_line(args: argparse.Namespace) -> Outcome:
     """Record a device that is set up here, that another program uses, or that is sent commands."""
-    from harness.stream.is900 import DriverConfig
     from harness.stream.recording import (
         RecordingWriter,
         check_commands,
@@ -156,8 +155,8 @@ def _record_line(args: argparse.Namespace) -> Outcome:
         refuse_flags(args, ("serve", "send"), f"with {args.port}", advice)
     if args.send is not None:
         check_commands(args.send, args.allow_writes)
-    stations = None if args.stations is None else tuple(parse_device_names(args.stations))
-    config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args, args.port))
+    stations = None if args.stations is None else parse_device_names(args.stations)
+    config = tracker_config(args, args.port, stations)
     source = "served" if args.serve is not None else "port" if args.send is None else "commands"
     note = {"source": source, "port": args.port, "harness": VERSION, **_plan_note(args)}
     options: dict[str, Any] = {"seconds": args.seconds, "log": print_status, "progress": show_progress}

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from harness.stream.host_clock import HostClockEstimator
     from harness.stream.inputs import INPUT_COMBINATIONS, make_inputs
     from harness.stream.line_events import EventCounter, LineEvent
+    from harness.stream.ports import TrackerConfig, open_tracker_at
     from harness.stream.station_counts import FRAME_COLUMNS, StationCounts, StreamSummary, format_csv_row, frame_rows
 else:
     __getattr__, __dir__ = lazy_names(__name__)
@@ -21,10 +22,12 @@ __all__ = [
     "LineEvent",
     "StationCounts",
     "StreamSummary",
+    "TrackerConfig",
     "TrackerFrame",
     "TrackerStream",
     "format_csv_row",
     "frame_rows",
     "make_inputs",
+    "open_tracker_at",
     "split_frames",
 ]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from harness.stream.is900.codec.reader import WireFormat
+from harness.stream.polhemus.codec.reader import WireFormat
 
 LineEventKind = Literal[
     "connected",  # streaming, for the first time or again

@@ -36,7 +36,7 @@ from harness.results import INDEX_FILE, load_run, read_summary
 from harness.results.findings import read_findings, read_placement
 from harness.simulate.physics import read_mcf
 from harness.stream import LineEvent, StreamSummary, format_csv_row, frame_rows
-from harness.stream.is900 import DEFAULT_EMITTERS
+from harness.stream.polhemus import DEFAULT_EMITTERS
 from harness.stream.recording import RecordingStream, RecordingWriter, record_capture
 from harness.study.placement.config import base_scenario, load_placement_study
 from harness.study.placement.placement_study import run_placement

@@ -18,10 +18,9 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadFile
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.driver.config import DriverConfig
-from harness.stream.is900.driver.is900 import open_tracker
-from harness.stream.is900.driver.tracker import Tracker
 from harness.stream.line_events import EventCounter
+from harness.stream.polhemus.driver.tracker import Tracker
+from harness.stream.ports import TrackerConfig, open_tracker_at
 from harness.stream.recording.recorder import tracked_text
 from harness.stream.recording.recording import RecordingWriter, read_marks
 
@@ -59,7 +58,7 @@ def finished_stretches(path: Path) -> set[str]:
 
 def capture_stretches(
     port: str,
-    config: DriverConfig,
+    config: TrackerConfig,
     path: Path,
     stretches: Sequence[Stretch],
     note: dict[str, object],
@@ -84,7 +83,7 @@ def capture_stretches(
     events = EventCounter(log)
     with (
         RecordingWriter(path, note) as writer,
-        open_tracker(port, config, observer=writer, on_event=events) as device,
+        open_tracker_at(port, config, observer=writer, on_event=events) as device,
         closing(_frames(device, path)) as frames,
     ):
         log(f"{device.identification or 'a device'} at {port}; stations {device.station_list}")

@@ -10,11 +10,10 @@ from typing import Any
 
 from harness.errors import BadInput, HarnessError
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.is900.driver.config import DriverConfig
-from harness.stream.is900.driver.is900 import open_tracker
-from harness.stream.is900.driver.tracker import Tracker
 from harness.stream.line_events import EventCounter, LineEvent
+from harness.stream.polhemus.codec.reader import WireFormat
+from harness.stream.polhemus.driver.tracker import Tracker
+from harness.stream.ports import TrackerConfig, open_tracker_at
 from harness.stream.recording.blocks import RECEIVED
 from harness.stream.recording.recording import RecordingWriter
 
@@ -99,7 +98,7 @@ PROGRESS_INTERVAL_S = 1.0
 
 def record_port(
     port: str,
-    config: DriverConfig,
+    config: TrackerConfig,
     writer: RecordingWriter,
     *,
     seconds: float | None = None,
@@ -116,7 +115,7 @@ def record_port(
 
     counts: dict[str, int] = {}
     events = EventCounter(log)
-    with _count_interrupt(counts), open_tracker(port, config, observer=writer, on_event=events) as device:
+    with _count_interrupt(counts), open_tracker_at(port, config, observer=writer, on_event=events) as device:
         name = device.identification or "a device"
         log(f"{name} at {port}; stations {device.station_list}; Ctrl-C ends the recording")
         log(device.setup_note)

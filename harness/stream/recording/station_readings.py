@@ -16,9 +16,9 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, freeze
 from harness.errors import BadFile
-from harness.stream.is900.codec.decoder import Garbage, RecordRun
-from harness.stream.is900.codec.reader import ReadingsDecoder, WireFormat, make_decoder
-from harness.stream.is900.codec.readings import Readings, concatenate_readings
+from harness.stream.polhemus.codec.decoder import Garbage, RecordRun
+from harness.stream.polhemus.codec.reader import ReadingsDecoder, WireFormat, make_decoder
+from harness.stream.polhemus.codec.readings import Readings, concatenate_readings
 from harness.stream.recording.blocks import CONFIGURED, MARK, NOTE, RECEIVED, RecordingBlock, scan_blocks
 from harness.stream.recording.recording import EXPECTED_FILE, Recording, describe_damage, open_recording
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.errors import BadFile
 from harness.measure import MeasuredPoses
-from harness.stream.is900.codec import WireFormat
+from harness.stream.polhemus.codec import WireFormat
 from harness.stream.recording import CaptureReader, StationReadings
 
 

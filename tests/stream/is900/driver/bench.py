@@ -8,16 +8,17 @@ import numpy as np
 
 from harness.errors import BadInput
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.is900.codec.samples import DeviceSamples
-from harness.stream.is900.driver.config import DriverConfig, DriverTiming
-from harness.stream.is900.driver.connection import Host
+from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
-from harness.stream.is900.driver.transport import LineLost, Transport
-from harness.stream.is900.emulator.config import EmulatorConfig
 from harness.stream.is900.emulator.emulator import Emulator
-from harness.stream.is900.emulator.faults import Fault
 from harness.stream.line_events import LineEvent
+from harness.stream.polhemus.codec.reader import WireFormat
+from harness.stream.polhemus.codec.samples import DeviceSamples
+from harness.stream.polhemus.driver.config import DriverTiming
+from harness.stream.polhemus.driver.connection import Host
+from harness.stream.polhemus.driver.transport import LineLost, Transport
+from harness.stream.polhemus.emulator.config import EmulatorConfig
+from harness.stream.polhemus.emulator.faults import Fault
 
 NAMES = ("head", "torso", "left_wrist", "right_wrist", "left_ankle", "right_ankle")
 LOOP_S = 10.0

@@ -7,10 +7,10 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.stream.is900.codec.replies import Emitter
-from harness.stream.is900.codec.samples import MAX_RANGES, DeviceSamples, FilterSamples
-from harness.stream.is900.emulator.config import EmulatorConfig
 from harness.stream.is900.emulator.device import Device
+from harness.stream.polhemus.codec.replies import Emitter
+from harness.stream.polhemus.codec.samples import MAX_RANGES, DeviceSamples, FilterSamples
+from harness.stream.polhemus.emulator.config import EmulatorConfig
 
 NAMES = (
     *("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head"),
