@@ -45,6 +45,7 @@ def _ignore(device: DeviceState, now_s: float) -> None:
 class FastrakDevice(CommandDevice):
     """A FASTRAK that plays samples and executes commands. The same bytes at the same times give the same answers."""
 
+    config_type = FastrakEmulatorConfig
     commands: ClassVar[CommandTable] = CommandTable(
         actions={
             "B": lambda device, argument, now_s: boresight_station(device, argument, now_s, True),
@@ -74,7 +75,7 @@ class FastrakEmulator(LineEmulator):
                 f"A FASTRAK with {len(samples.stations)} stations at {samples.rate_hz:g} Hz.",
                 f"It sends {MOST_DEVICE_HZ['fastrak']:g} records per second in total: give at most {limit_hz:g} Hz.",
             )
-        super().__init__(FastrakDevice(samples, config or FastrakEmulatorConfig(), now_s), now_s)
+        super().__init__(FastrakDevice(samples, config, now_s), now_s)
 
 
 @contextlib.contextmanager

@@ -6,6 +6,7 @@ It does no input or output; time is an argument. `device.Device` adds the comman
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from harness.stream.polhemus.codec.replies import ParsedReply, StatusRecord
 from harness.stream.polhemus.codec.samples import DeviceSamples
@@ -58,9 +59,12 @@ class DeviceState:
     Stations beyond those of the samples are not plugged in.
     """
 
+    config_type: ClassVar[type[EmulatorConfig]] = EmulatorConfig
+    """Type of the configuration; its defaults serve where none is given."""
+
     def __init__(self, samples: DeviceSamples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
         """Switch the device on at `now_s` [s]."""
-        self.samples, self.config = samples, config or EmulatorConfig()
+        self.samples, self.config = samples, config or self.config_type()
         self.firmware = self.config.firmware
         self.rounds = RoundEncoder(SamplePlayer(samples, now_s), self.config)
         self.streaming = self.suspended = False
