@@ -1,4 +1,4 @@
-"""The Polhemus FASTRAK: the driver of a device, and an emulator of one (docs/fastrak.md)."""
+"""The Polhemus FASTRAK: the driver of a device, and an emulator of one (docs/device.md, FASTRAK)."""
 
 from typing import TYPE_CHECKING
 

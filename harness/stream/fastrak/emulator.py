@@ -1,4 +1,4 @@
-"""An emulated FASTRAK with its line, and its service at a port (docs/fastrak.md 4)."""
+"""An emulated FASTRAK with its line, and its service at a port (docs/device.md, FASTRAK)."""
 
 import contextlib
 import time

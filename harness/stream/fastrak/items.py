@@ -1,4 +1,4 @@
-"""The output items of a FASTRAK (docs/fastrak.md 3)."""
+"""The output items of a FASTRAK (docs/device.md, FASTRAK)."""
 
 FASTRAK_LIST = (2, 11, 1)
 """Position, quaternion, CR LF: 33 bytes in binary. The list of a session."""

@@ -23,12 +23,12 @@ STATION_CHARACTERS = b"123456789ABC"
 DeviceFamily = Literal["is900", "fastrak"]
 DEVICE_NAMES: dict[DeviceFamily, str] = {"is900": "IS-900", "fastrak": "FASTRAK"}
 FAMILY_STATIONS: dict[DeviceFamily, bytes] = {"is900": STATION_CHARACTERS, "fastrak": STATION_CHARACTERS[:4]}
-"""Characters of the stations that a device of a family may have (docs/is900.md 5, docs/fastrak.md 2)."""
+"""Characters of the stations that a device of a family may have (docs/is900.md 5; docs/device.md, FASTRAK)."""
 MOST_DEVICE_HZ: dict[DeviceFamily, float] = {"is900": 180.0, "fastrak": 120.0}
 """Highest rate of a station [Hz]."""
 POSE_ERRORS: dict[DeviceFamily, bytes] = {"is900": b"", "fastrak": b"jklxy"}
 """Status letters of a record that concern its pose: the receiver's signal is saturated (j), low (k) or zero (l), or the
-station is outside its box (x) or its angles (y) (docs/fastrak.md 3)."""
+station is outside its box (x) or its angles (y) (docs/device.md, FASTRAK)."""
 STANDARD_LIST = (40, 2, 11, 21, 1)
 """Quality, position, quaternion, time, CR LF: 38 bytes."""
 SHORT_LIST = (40, 18, 19, 21, 1)
