@@ -2,7 +2,7 @@
 
 import contextlib
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
@@ -10,8 +10,9 @@ from typing import ClassVar
 from harness.errors import BadInput
 from harness.stream.fastrak.items import FASTRAK_ITEMS, FASTRAK_LIST
 from harness.stream.polhemus.codec.items import FAMILY_STATIONS, MOST_DEVICE_HZ
-from harness.stream.polhemus.codec.replies import StatusRecord
+from harness.stream.polhemus.codec.replies import ParsedReply, StatusRecord
 from harness.stream.polhemus.codec.samples import DeviceSamples
+from harness.stream.polhemus.emulator.argument import UNKNOWN_COMMAND, CommandArgument, CommandError
 from harness.stream.polhemus.emulator.config import EmulatorConfig
 from harness.stream.polhemus.emulator.device import IMMEDIATE_COMMANDS, CommandDevice, CommandTable, boresight_station
 from harness.stream.polhemus.emulator.device_state import DeviceState
@@ -23,6 +24,7 @@ from harness.stream.polhemus.emulator.setting_commands import (
     STATION_SETTERS,
     no_change,
 )
+from harness.stream.polhemus.emulator.settings import DeviceSettings
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,9 @@ class FastrakEmulatorConfig(EmulatorConfig):
     firmware: str = "3.02"
     identification: str = "OutputCompensat CPG2030-003-10"
     """Text of the status record: the default of the command `X` in the manual."""
+    tagged: bool = False
+    """Whether the status record has the tag `F3` and the map of the receivers, as the manual of 2012 says; VR Juggler
+    refuses it."""
     known_items: ClassVar[frozenset[int]] = FASTRAK_ITEMS
     usual_items: ClassVar[tuple[int, ...]] = FASTRAK_LIST
     known_stations: ClassVar[str] = FAMILY_STATIONS["fastrak"].decode()
@@ -42,6 +47,14 @@ def _ignore(device: DeviceState, now_s: float) -> None:
     """Compensation (`D`, `d`) changes no pose here: the samples have none."""
 
 
+_WITHOUT_EFFECT = ("I", "Q", "r")
+"""Increment, limits of angles, mounting of the transmitter: taken, not stored, so that they cannot be read."""
+
+
+def _refuse_query(settings: DeviceSettings, argument: CommandArgument) -> Iterable[ParsedReply]:
+    raise CommandError(UNKNOWN_COMMAND)
+
+
 class FastrakDevice(CommandDevice):
     """A FASTRAK that plays samples and executes commands. The same bytes at the same times give the same answers."""
 
@@ -50,16 +63,19 @@ class FastrakDevice(CommandDevice):
         actions={
             "B": lambda device, argument, now_s: boresight_station(device, argument, now_s, True),
         },
-        setters=STATION_SETTERS,
+        setters={**STATION_SETTERS, **dict.fromkeys(_WITHOUT_EFFECT, no_change)},
         set_only={**STATION_RESETS, "e": no_change, "y": no_change},
-        queries=STATION_QUERIES,
+        queries={**STATION_QUERIES, **dict.fromkeys(_WITHOUT_EFFECT, _refuse_query)},
         immediate={**IMMEDIATE_COMMANDS, "D": _ignore, "d": _ignore},
     )
 
     def status_record(self) -> StatusRecord:
-        """Return the reply to `S`, with the tag of a FASTRAK and the map of the receivers that are plugged in."""
+        """Return the reply to `S`, with the map of the receivers that are plugged in where it is tagged."""
+        status = replace(super().status_record(), blank=False)
+        if not (isinstance(self.config, FastrakEmulatorConfig) and self.config.tagged):
+            return status
         plugged = sum(1 << self.config.known_stations.index(name) for name in self.rounds.station_characters)
-        return replace(super().status_record(), tag=f"F3{plugged:X}")
+        return replace(status, tag=f"F3{plugged:X}")
 
 
 class FastrakEmulator(LineEmulator):

@@ -5,7 +5,7 @@ import pytest
 
 from harness.core import rotations
 from harness.errors import BadInput
-from harness.stream.fastrak.emulator import FastrakDevice, FastrakEmulator
+from harness.stream.fastrak.emulator import FastrakDevice, FastrakEmulator, FastrakEmulatorConfig
 from harness.stream.polhemus.codec.replies import StatusRecord, parse_reply
 from tests.stream.is900.emulator.played import DeviceSession, make_samples
 
@@ -15,8 +15,8 @@ QUARTER_TURN = rotations.about_z(np.pi / 2.0)
 class FastrakSession(DeviceSession):
     """A FASTRAK and its clock."""
 
-    def __init__(self, stations: int = 2) -> None:
-        self.device = FastrakDevice(make_samples(stations, quaternion=QUARTER_TURN), None, 0.0)
+    def __init__(self, stations: int = 2, config: FastrakEmulatorConfig | None = None) -> None:
+        self.device = FastrakDevice(make_samples(stations, quaternion=QUARTER_TURN), config, 0.0)
         self.now_s = 0.0
 
 
@@ -29,8 +29,10 @@ def test_records_have_the_layout_of_the_manual() -> None:
     assert device.send(b"O1,5,6,7,1\rFP") == (b"01  0.0000 1.0000 0.0000-1.0000 0.0000 0.0000 0.0000 0.0000 1.0000\r\n")
 
 
-def test_the_status_has_the_tag_of_a_fastrak() -> None:
-    device = FastrakSession(3)
+def test_the_status_has_the_layout_of_the_manual() -> None:
+    """Firmware of 2012 has the tag `F3` and the map of the receivers; older firmware has blanks."""
+    assert FastrakSession(3).send(b"S") == b"21S3F0         3.02  OutputCompensat CPG2030-003-10  \r\n"
+    device = FastrakSession(3, FastrakEmulatorConfig(tagged=True))
     assert device.send(b"S") == b"21S3F0    F37  3.02  OutputCompensat CPG2030-003-10  \r\n"
     status = parse_reply(device.send(b"fuCS")[:55])
     assert isinstance(status, StatusRecord)
@@ -75,6 +77,7 @@ def test_stations_are_switched_and_told() -> None:
         (b"MS\r", -99),  # commands of InterSense
         (b"MZ\r", -99),
         (b"l*\r", -3),
+        (b"I1\r", -99),  # not stored
     ],
 )
 def test_what_only_an_is900_has_is_refused(command: bytes, code: int) -> None:

@@ -45,13 +45,15 @@ class StatusRecord(ParsedReply):
     short: bool = False
     """Whether the record has 54 bytes."""
     tag: str = ""
-    """Three characters of a FASTRAK: `F3` and the map of its receivers; its identification follows without a blank."""
+    """Three characters of a FASTRAK of 2012: `F3` and the map of its receivers; older ones have blanks."""
+    blank: bool = True
+    """Whether a blank comes before the identification, as from an IS-900."""
 
     def text_line(self) -> str:
         low = self.binary | self.centimetres << 1 | self.compensation << 2 | self.continuous << 3
         flags = f"{(self.reserved & 0xFF0) | low:03X}"
         head = f"2{self.station[:1]:1}S{flags}{self.self_test[:3]:3} {self.tag[:3]:5}{self.firmware[:6]:6}"
-        text = head + ("" if self.tag else " ") + self.identification
+        text = head + " " * self.blank + self.identification
         return f"{text:53.53}"[: 52 if self.short else 53]
 
 
@@ -69,6 +71,7 @@ def _parse_status(match: re.Match[str]) -> StatusRecord:
         reserved=flags & 0xFF0,
         short=len(text) == 52,
         tag=text[9:15].strip(),
+        blank=text[21:22] == " ",
     )
 
 

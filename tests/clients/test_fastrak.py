@@ -1,4 +1,4 @@
-"""The package `fastrakserialdriver` at the pty of the emulated FASTRAK. It needs no hardware."""
+"""Other drivers at the pty of the emulated FASTRAK: VRPN, VR Juggler, and the package `fastrakserialdriver`."""
 
 import time
 from pathlib import Path
@@ -10,6 +10,10 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.stream.fastrak import serve_fastrak
 from harness.stream.polhemus.codec import DeviceSamples, from_yaw_pitch_roll_deg
+from tests.clients import device as circles
+from tests.clients.device import yaw_pitch_roll_deg
+from tests.clients.gadgeteer import VrJuggler
+from tests.clients.vrpn import VrpnClient
 
 INCH_M = 0.0254
 RATE_HZ, STATIONS, INSTANTS = 40.0, 3, 240
@@ -69,3 +73,34 @@ def test_the_package_reads_every_pose(tmp_path: Path) -> None:
         check_pose((pose.x, pose.y, pose.z, pose.psi, pose.theta, pose.phi), position_m, quaternions)
     assert read > 0.8 * len(records)
     assert summary["commands_refused"] == 0
+
+
+def test_vr_juggler_polls_it(tmp_path: Path) -> None:
+    link = tmp_path / "port"
+    with serve_fastrak(circles.make_samples(3, 40.0), pty=link):
+        client = VrJuggler(str(link))
+        client.open(LIMIT_S)
+        assert client.stations == 3
+        client.tty.write(b"O3,2,11,1\r")  # it gives stations 1 and 2 alone their lists
+        for _ in range(30):
+            client.sample(LIMIT_S)
+            for station, position_m in client.positions_m.items():
+                angles_deg = yaw_pitch_roll_deg(client.quaternions[station])
+                circles.check_pose(station, position_m, angles_deg, 1e-4, 0.01)
+        client.close()
+
+
+def test_vrpn_serves_it(tmp_path: Path) -> None:
+    link = tmp_path / "port"
+    with serve_fastrak(circles.make_samples(4, 30.0), pty=link) as server:
+        client = VrpnClient(str(link))
+        assert client.serve(lambda: len(client.reports) >= 120, 60.0), client.log
+        client.close()
+        refused = server.summary()["commands_refused"]
+    assert client.log == ["resetting, attempt 1", "gives status", "reset completed"]
+    assert {report.sensor for report in client.reports} == {0, 1, 2, 3}
+    for report in client.reports:
+        x, y, z, w = report.quaternion_xyzw
+        angles_deg = yaw_pitch_roll_deg((w, x, y, z))
+        circles.check_pose(report.sensor + 1, report.position_m, angles_deg, 1e-4, 0.01)
+    assert refused == 0
