@@ -21,6 +21,7 @@ LineEventKind = Literal[
     "present",  # a station that was missing sends again
     "unexpected",  # a station that the session did not ask for was switched on
     "out of range",  # a station is farther away than the output list can report
+    "device error",  # records carry an error of the device's own tests
     "settings",  # another program left settings in the device, or they are put back
     "refused",  # the device that came back cannot be used as it is
 ]

@@ -18,10 +18,10 @@ from tests.stream.fastrak.bench import fastrak_bench, open_fastrak
 from tests.stream.is900.driver.bench import device_of, frames_for
 
 
-def record(path: Path, **options: bool) -> None:
+def record(path: Path, binary: bool = True) -> None:
     bench = fastrak_bench(rate_hz=40.0)
     with RecordingWriter(path) as writer:
-        writer_frames = open_fastrak(bench, FastrakConfig(stations=("a", "b", "c"), **options), writer)
+        writer_frames = open_fastrak(bench, FastrakConfig(stations=("a", "b", "c"), binary=binary), writer)
         with writer_frames as driver:
             frames_for(driver, bench, 3.0)
             assert device_of(bench).streaming

@@ -15,6 +15,7 @@ from harness.stream.polhemus.codec.clock import ClockUnwrapper
 from harness.stream.polhemus.codec.datagram import DatagramDecoder
 from harness.stream.polhemus.codec.decoder import Decoder, DecoderEvent, Garbage, RecordRun, Reply
 from harness.stream.polhemus.codec.items import (
+    BLANK_STATUS,
     DEVICE_NAMES,
     FAMILY_STATIONS,
     MOST_DEVICE_HZ,
@@ -135,6 +136,8 @@ class FrameReader:
         """(S,) number of records of each station whose position is beyond the range of the list."""
         self.station_records: Counter[str] = Counter()
         """Number of records by station, also of those that are not in the format, whose bytes are garbage."""
+        self.device_errors: set[tuple[str, str]] = set()
+        """Stations whose records carried an error of a FASTRAK's own tests, each with the error's letter."""
         self.garbage_bytes = 0
         self.other_bytes = 0
         """Garbage that is records of stations that are not in the format [bytes]."""
@@ -230,6 +233,9 @@ class FrameReader:
         self._deferred.append((run.table, self._ends_s[self._ends.searchsorted(last_byte)]))
         self.records += count
         self.station_records.update(map(chr, run.table["station"].tolist()))
+        if self.wire.family == "fastrak" and np.any(failed := run.table["status"] != BLANK_STATUS):
+            rows = run.table[failed]
+            self.device_errors |= set(zip(map(chr, rows["station"]), map(chr, rows["status"]), strict=True))
         previous_row, self._row = self._row, self.wire.characters.index(run.table["station"][-1])
         return count > 1 or self._row <= previous_row or self._row == len(self.wire.stations) - 1
 

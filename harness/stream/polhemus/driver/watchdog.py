@@ -12,7 +12,13 @@ import numpy as np
 
 from harness.stream.frame import TrackerFrame
 from harness.stream.line_events import LineEventKind
-from harness.stream.polhemus.codec.items import STANDARD_LIST, STATION_CHARACTERS, DeviceFamily, position_range_m
+from harness.stream.polhemus.codec.items import (
+    POSE_ERRORS,
+    STANDARD_LIST,
+    STATION_CHARACTERS,
+    DeviceFamily,
+    position_range_m,
+)
 from harness.stream.polhemus.codec.reader import FrameReader, WireFormat
 from harness.stream.polhemus.codec.replies import (
     OutputList,
@@ -62,6 +68,8 @@ class Watchdog:
         self._stations = StationWatch(timing)
         self._beyond: set[str] = set()
         """Stations that were reported as out of range."""
+        self._device_errors: set[tuple[str, str]] = set()
+        """Stations and errors of the device that were reported."""
 
     def pause(self) -> None:
         """Data stop flowing."""
@@ -108,7 +116,7 @@ class Watchdog:
             return []
         if bytes_arrived:
             self._last_byte_s = now_s
-        diagnoses = self._check_garbage(now_s, reader) + self._check_range(reader)
+        diagnoses = self._check_garbage(now_s, reader) + self._check_range(reader) + self._check_errors(reader)
         diagnoses += self._check_silence(now_s) + self._check_stations(now_s, reader)
         while reader.replies:
             diagnoses += self._check_reply(self._wire, parse_reply(reader.replies.popleft().line), now_s)
@@ -156,6 +164,22 @@ class Watchdog:
         where = f"station {', '.join(beyond)} is farther than {range_m:g} m from the tracker's origin on an axis"
         text = f"{where}: such positions are not valid. Use a list with item 2, as {items}"
         return [Diagnosis("none", "out of range", text)]
+
+    def _check_errors(self, reader: FrameReader) -> list[Diagnosis]:
+        """Report each error of the device and station once."""
+        new = sorted(reader.device_errors - self._device_errors)
+        self._device_errors |= reader.device_errors
+        names = dict(zip(reader.wire.characters.decode(), reader.wire.stations, strict=True))
+        what = {True: "its poses are suspect", False: "its poses may be sound"}
+        return [
+            Diagnosis(
+                "none",
+                "device error",
+                f"station {names[station]} reports error {letter} of the device's own tests: "
+                f"{what[ord(letter) in POSE_ERRORS[reader.wire.family]]}",
+            )
+            for station, letter in new
+        ]
 
     def _check_silence(self, now_s: float) -> list[Diagnosis]:
         elapsed_s, timing = now_s - self._last_record_s, self._timing

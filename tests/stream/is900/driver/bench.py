@@ -16,8 +16,10 @@ from harness.stream.polhemus.codec.reader import WireFormat
 from harness.stream.polhemus.codec.samples import DeviceSamples
 from harness.stream.polhemus.driver.config import DriverTiming
 from harness.stream.polhemus.driver.connection import Host
+from harness.stream.polhemus.driver.tracker import Tracker
 from harness.stream.polhemus.driver.transport import LineLost, Transport
 from harness.stream.polhemus.emulator.config import EmulatorConfig
+from harness.stream.polhemus.emulator.emulator import LineEmulator
 from harness.stream.polhemus.emulator.faults import Fault
 
 NAMES = ("head", "torso", "left_wrist", "right_wrist", "left_ankle", "right_ankle")
@@ -59,7 +61,7 @@ class EmulatedDevice:
     """The emulator as a device."""
 
     def __init__(self, samples: DeviceSamples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
-        self.emulator = Emulator(samples, config, now_s)
+        self.emulator: LineEmulator = Emulator(samples, config, now_s)
 
     def receive(self, data: bytes, now_s: float) -> None:
         self.emulator.receive(data, now_s)
@@ -191,7 +193,7 @@ class BenchLine:
             raise LineLost(self.name, "closed" if self._closed else "unplugged")
 
 
-def frames_for(stream: Is900, bench: Bench, duration_s: float) -> list[TrackerFrame]:
+def frames_for(stream: Tracker, bench: Bench, duration_s: float) -> list[TrackerFrame]:
     """Return the frames of this duration."""
     until_s = bench.now_s + duration_s
     frames: Iterator[TrackerFrame] = iter(stream)
