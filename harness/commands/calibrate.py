@@ -139,7 +139,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
 
     if args.scenario is None:
         raise BadInput("--port without --scenario.", "Name the scenario with the stations: --scenario NAME.")
-    scenario, asked = load_scenario(args.scenario), parse_device_stations(args.stations)
+    scenario, asked = load_scenario(args.scenario), parse_device_stations(args.stations, args.port)
     stations = tuple(select_stations(scenario, default_station_count(scenario) if asked is None else asked))
     session = CalibrationSession(args.scenario, stations, args.kind or "poses", args.clip, args.mocap)
     with ExitStack() as opened:

@@ -4,13 +4,14 @@ import argparse
 import shlex
 import time
 from collections.abc import Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from typing import TYPE_CHECKING
 
 from harness.commands.flags import (
     FASTRAK_PREFIX,
     Verbs,
     add_verb,
+    add_vrpn_flag,
     output_link,
     parse_characters,
     parse_items,
@@ -28,6 +29,7 @@ from harness.commands.playback_flags import (
     parse_device_stations,
 )
 from harness.core.interrupts import defer_interrupts
+from harness.core.network import LOOPBACK
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
@@ -37,7 +39,7 @@ if TYPE_CHECKING:
 
 
 def add_emulate(verbs: Verbs) -> None:
-    text = "play a scenario as a tracker in real time, at a pseudo terminal or a TCP port, until Ctrl-C"
+    text = "play a scenario as a tracker in real time, at a pseudo terminal, a TCP port or a VRPN server, until Ctrl-C"
     verb = add_verb(verbs, "emulate", text, run_emulate, "seed", "mocap")
     verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
     text = "device to be: is900 (default), or fastrak with 1 to 4 stations, which share 120 records per second"
@@ -46,6 +48,7 @@ def add_emulate(verbs: Verbs) -> None:
     text = "open a pseudo terminal, and link to it under this name"
     where.add_argument("--pty", type=output_link, metavar="LINK", help=text)
     where.add_argument("--tcp", metavar="HOST:PORT", help="listen at a TCP port; port 0 takes a free one")
+    add_vrpn_flag(where, "the stations of the emulated device, which the harness itself then uses")
     text = "also broadcast UDP packets from the start, as after MEthUdp1; without HOST, to this computer"
     verb.add_argument("--udp", metavar="[HOST:]PORT", help=text)
     text = "accept connections from other computers, or broadcast to them"
@@ -78,14 +81,16 @@ def add_emulate(verbs: Verbs) -> None:
 
 
 def run_emulate(args: argparse.Namespace) -> Outcome:
-    from harness.stream.polhemus import LOOPBACK, open_port, parse_udp_address, play_emulator
+    from harness.stream.polhemus import open_port, parse_udp_address, play_emulator
     from harness.stream.polhemus.codec import check_emulated_capacity, check_range, missing_items
 
     if args.pty and args.anywhere and not args.udp:
         raise BadInput("--anywhere with --pty.", "--anywhere is for --tcp and --udp: leave it out.")
     udp = None if args.udp is None else parse_udp_address(args.udp, args.anywhere)
-    if args.tcp and args.check_baud:
-        raise BadInput("--check-baud with --tcp.", "A TCP connection has no baud rate; --check-baud is for --pty.")
+    if args.check_baud and not args.pty:
+        raise BadInput("--check-baud without --pty.", "Other connections have no baud rate: leave it out.")
+    if args.vrpn and args.udp:
+        raise BadInput("--udp with --vrpn.", "Give --tcp or --pty for a device that also broadcasts.")
     stations = parse_device_stations(args.stations)
     if args.device == "fastrak":
         _prepare_fastrak(args, stations)
@@ -101,6 +106,8 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     check_range(args.items or (), playback.reach_m)
     if not (args.unpaced or tracker.overload):
         check_emulated_capacity(len(scenario.stations), tracker.rate_hz, items, config.baud, playback.reach_m)
+    if args.vrpn:
+        return _serve_vrpn(args, samples, config, items)
     with ExitStack() as opened:
         with defer_interrupts():
             port = open_port(args.pty, args.tcp, anywhere=args.anywhere, log=print_status)
@@ -119,6 +126,37 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
         if udp:
             print_status(f"broadcasts to udp://{udp[0]}:{udp[1]}")
         counts = play_emulator(emulator, port, udp[0] if udp else LOOPBACK)
+    return print_result(args, counts, *(f"{name:20} {value:.6g}" for name, value in counts.items()))
+
+
+def _serve_vrpn(
+    args: argparse.Namespace, samples: "DeviceSamples", config: "EmulatorConfig", items: tuple[int, ...]
+) -> Outcome:
+    """Use the emulated device as its driver does, and serve what it reports."""
+    from harness.stream import EventCounter, open_tracker_at
+    from harness.stream.fastrak import FastrakConfig, FastrakEmulatorConfig, serve_fastrak
+    from harness.stream.is900 import DriverConfig, serve_emulator
+    from harness.stream.vrpn import RelayedStream, open_server
+
+    with ExitStack() as opened:
+        with defer_interrupts():
+            server = opened.enter_context(open_server(args.vrpn, anywhere=args.anywhere, log=print_status))
+        fastrak, place = isinstance(config, FastrakEmulatorConfig), f"{LOOPBACK}:0"
+        service = serve_fastrak(samples, config, tcp=place) if fastrak else serve_emulator(samples, config, tcp=place)
+        device = opened.enter_context(service)
+        driver = (FastrakConfig if fastrak else DriverConfig)(
+            items=items, stations=samples.stations, characters=config.station_characters(len(samples.stations))
+        )
+        events = EventCounter(lambda text: print_status(f"line: {text}"))
+        tracker = opened.enter_context(open_tracker_at(device.name, driver, on_event=events))
+        sensors = ", ".join(f"{sensor} {name}" for sensor, name in enumerate(tracker.stations))
+        print_status(f"VRPN: {server.names[0]} with the sensors {sensors} at {tracker.rate_hz:g} Hz; Ctrl-C ends it")
+        following = ["harness", "record", f"vrpn:{server.names[0]}", "take.rec"]
+        print_status(f"next, in another terminal: {shlex.join(following)}")
+        with suppress(KeyboardInterrupt):
+            for _ in RelayedStream(tracker, server, server.trackers[0], tracker.measured_unix_s):
+                pass
+        counts = {**tracker.counts, "reports": server.sent, "clients": server.clients}
     return print_result(args, counts, *(f"{name:20} {value:.6g}" for name, value in counts.items()))
 
 

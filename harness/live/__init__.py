@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from harness.live.session_control import SessionControl
     from harness.live.viewer import ViewerOutput
     from harness.live.vmc import VmcOutput
+    from harness.live.vrpn_output import VrpnOutput
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
@@ -27,6 +28,7 @@ __all__ = [
     "SessionSetup",
     "ViewerOutput",
     "VmcOutput",
+    "VrpnOutput",
     "draw_poses",
     "open_outputs",
     "run_session",

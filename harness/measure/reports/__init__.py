@@ -28,6 +28,8 @@ if TYPE_CHECKING:
         estimated_poses,
         residual_series,
     )
+    from harness.measure.surveyed_points import SurveyComparison
+    from harness.measure.uncertainty import UncertaintyBudget
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
@@ -45,6 +47,8 @@ __all__ = [
     "ResidualSeries",
     "StationAccuracy",
     "StationFigures",
+    "SurveyComparison",
+    "UncertaintyBudget",
     "UnitReport",
     "ValidationReport",
     "compare_with_expected",

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
-    from harness.stream.polhemus.driver.tracker import Tracker
     from harness.stream.polhemus.driver.transport import open_transport
     from harness.stream.polhemus.emulator.config import EmulatorConfig
     from harness.stream.polhemus.emulator.device_state import SentMessage
@@ -14,13 +13,12 @@ if TYPE_CHECKING:
     from harness.stream.polhemus.emulator.server import EmulatorServer, open_port, play_emulator
     from harness.stream.polhemus.emulator.settings import DEFAULT_EMITTERS
     from harness.stream.polhemus.emulator.tcp_port import TcpPort
-    from harness.stream.polhemus.emulator.udp_broadcast import LOOPBACK, UdpPort, parse_udp_address
+    from harness.stream.polhemus.emulator.udp_broadcast import UdpPort, parse_udp_address
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
 __all__ = [
     "DEFAULT_EMITTERS",
-    "LOOPBACK",
     "EmulatorConfig",
     "EmulatorServer",
     "Fault",
@@ -28,7 +26,6 @@ __all__ = [
     "LineEmulator",
     "SentMessage",
     "TcpPort",
-    "Tracker",
     "UdpPort",
     "add_byte_faults",
     "open_port",

@@ -206,7 +206,9 @@ class FrameAssembler:
         """Time of the last reading of each frame (F,) [s]; strictly increasing, if only by one rounding step."""
         last = np.append(np.flatnonzero(np.diff(frame)), len(frame) - 1)
         out: Floats = np.maximum.accumulate(readings.received_s[last])
-        if np.all(np.diff(out, prepend=self._received_s) > 0.0):
+        with np.errstate(invalid="ignore"):  # times of a damaged recording may be infinite
+            increases = bool(np.all(np.diff(out, prepend=self._received_s) > 0.0))
+        if increases:
             self._received_s = float(out[-1])
             return out
         for i, received_s in enumerate(out.tolist()):

@@ -13,6 +13,7 @@ from harness.stream.polhemus.codec.items import BAUD_RATES, DEVICE_NAMES, with_a
 from harness.stream.polhemus.codec.replies import DeviceError, ParsedReply, StatusRecord, parse_reply
 from harness.stream.polhemus.driver.config import DriverTiming, LineConfig
 from harness.stream.polhemus.driver.transport import FASTRAK_PREFIX, LineLost, Transport, family_of, open_transport
+from harness.stream.tracker import DriverClosed
 
 
 @dataclass(frozen=True)
@@ -35,10 +36,6 @@ _STOP_TIMEOUT_FACTOR = 10
 """Multiple of `quiet_s` for which a device may go on sending after `c`, because its buffers empty first."""
 
 ReplyType = TypeVar("ReplyType", bound=ParsedReply)
-
-
-class DriverClosed(Exception):
-    """Ends a wait when the driver is closed meanwhile."""
 
 
 class DeviceConnection:

@@ -15,7 +15,6 @@ from harness.stream.polhemus.codec.replies import OutputList, StatusRecord
 from harness.stream.polhemus.driver.connection import (
     DetectedDevice,
     DeviceConnection,
-    DriverClosed,
     NoAnswer,
     candidate_baud_rates,
     detect_device,
@@ -25,6 +24,7 @@ from harness.stream.polhemus.driver.stations import StationSelection, query_acti
 from harness.stream.polhemus.driver.tracker import Tracker
 from harness.stream.polhemus.driver.transport import LineLost
 from harness.stream.polhemus.driver.watchdog import Diagnosis, Watchdog, diagnose_reply
+from harness.stream.tracker import DriverClosed
 
 
 class LineTracker(Tracker):

@@ -13,12 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
+from harness.core.network import LOOPBACK, parse_address
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.stream.polhemus.emulator.device_state import SentMessage
 from harness.stream.polhemus.emulator.emulator import LineEmulator
-from harness.stream.polhemus.emulator.tcp_port import LogCallback, Port, TcpPort, parse_address
-from harness.stream.polhemus.emulator.udp_broadcast import LOOPBACK, UdpBroadcast, UdpPort
+from harness.stream.polhemus.emulator.tcp_port import LogCallback, Port, TcpPort
+from harness.stream.polhemus.emulator.udp_broadcast import UdpBroadcast, UdpPort
 
 SentCallback = Callable[[SentMessage], None]
 MAX_WAIT_S = 1.0

@@ -5,15 +5,12 @@ them.
 import ipaddress
 import socket
 
-from harness.core.network import resolve_host
+from harness.core.network import LOOPBACK, check_loopback, parse_address, resolve_host
 from harness.errors import BadInput
 from harness.stream.polhemus.codec.datagram import Datagram
 from harness.stream.polhemus.codec.records import RecordValues, yaw_pitch_roll_deg
 from harness.stream.polhemus.emulator.device_state import DeviceState
 from harness.stream.polhemus.emulator.settings import STATION_NAMES, DeviceSettings
-from harness.stream.polhemus.emulator.tcp_port import check_loopback, parse_address
-
-LOOPBACK = "127.0.0.1"
 
 
 def parse_udp_address(text: str, anywhere: bool) -> tuple[str, int]:
