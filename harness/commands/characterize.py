@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.commands.flags import (
+    FASTRAK_PREFIX,
     LINE_FLAGS,
     Verbs,
     add_line_flags,
@@ -112,7 +113,7 @@ def _parse_bar(text: str | None, length_mm: tuple[float, float] | None) -> "Bar 
 def _is_port(source: str) -> bool:
     """Whether a source is the name of a port: an address, a device of the system, or COM3."""
     path = Path(source)
-    named = "://" in source or source.startswith(VRPN_PREFIX)
+    named = "://" in source or source.startswith((FASTRAK_PREFIX, VRPN_PREFIX))
     return named or path.is_char_device() or (source.upper().startswith("COM") and source[3:].isdecimal())
 
 

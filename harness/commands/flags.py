@@ -14,6 +14,7 @@ from harness.errors import BadFile, BadInput, Outcome
 if TYPE_CHECKING:
     from harness.experiment.methods import Isolation
     from harness.stream import TrackerConfig
+    from harness.stream.fastrak import FastrakConfig
     from harness.stream.is900 import DriverConfig
 
 Verbs = Any  # argparse's subparsers object has no public type
@@ -21,6 +22,8 @@ MOST_PROCESSES = 1024
 """Most worker processes on one computer [choice]."""
 LINE_FLAGS = ("items", "baud", "quality", "keep_settings", "boresight", "alignment")
 """Flags of `add_line_flags`, as attributes of the parsed command line."""
+FASTRAK_PREFIX = "fastrak:"
+"""Beginning of a port at which a FASTRAK is."""
 STATION_CHARACTERS = "123456789ABC"
 """Characters of the stations that a device may have (docs/is900.md 5)."""
 Action = Callable[[argparse.Namespace], Outcome]
@@ -157,6 +160,9 @@ def line_options(args: argparse.Namespace, port: str) -> dict[str, Any]:
     if port.startswith(("udp:", VRPN_PREFIX)):
         advice = f"It needs commands, and {'UDP' if port.startswith('udp:') else 'VRPN'} carries none: leave it out."
         refuse_flags(args, sorted(LINE_FLAGS), f"with {port}", advice)
+    if port.startswith(FASTRAK_PREFIX):
+        advice = "It is for an IS-900: leave it out."
+        refuse_flags(args, sorted({*LINE_FLAGS} - {"items", "baud"}), f"with {port}", advice)
     options = {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
     if not port.startswith(VRPN_PREFIX) and (characters := parse_characters(args.stations)):
         options["characters"] = characters
@@ -175,12 +181,18 @@ def tracker_config(args: argparse.Namespace, port: str, stations: Iterable[str] 
     return VrpnConfig(names, tuple(map(int, mapped.values())) or None, args.rate)
 
 
-def line_config(args: argparse.Namespace, port: str, stations: Iterable[str] | None, **more: Any) -> "DriverConfig":
-    """The settings of an IS-900 on a line that those flags and `more` give."""
+def line_config(
+    args: argparse.Namespace, port: str, stations: Iterable[str] | None, **more: Any
+) -> "DriverConfig | FastrakConfig":
+    """The settings of a device on a line that those flags give; `more` is for an IS-900."""
+    names, options = None if stations is None else tuple(stations), line_options(args, port)
+    if port.startswith(FASTRAK_PREFIX):
+        from harness.stream.fastrak import FastrakConfig
+
+        return FastrakConfig(**options, stations=names, rate_hz=args.rate)
     from harness.stream.is900 import DriverConfig
 
-    names = None if stations is None else tuple(stations)
-    return DriverConfig(**{**more, **line_options(args, port)}, stations=names, rate_hz=args.rate)
+    return DriverConfig(**{**more, **options}, stations=names, rate_hz=args.rate)
 
 
 def output_folder(text: str) -> Path:

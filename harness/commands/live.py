@@ -186,7 +186,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
 
 def _driver_config(args: argparse.Namespace, playback: "Playback") -> "TrackerConfig":
     """How the tracker is set up for the stations and the motion of a playback."""
-    from harness.stream.is900.codec import position_range_m
+    from harness.stream.polhemus.codec import position_range_m
 
     items = args.items or playback.tracker.items
     reach_m = playback.reach_m if position_range_m(items) else None  # it takes a simulation

@@ -104,7 +104,7 @@ def _record(args: argparse.Namespace) -> Outcome:
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     from harness.mocap.synthetic import stretch_marks
-    from harness.stream.is900 import add_byte_faults, unapplied_kinds
+    from harness.stream.polhemus import add_byte_faults, unapplied_kinds
     from harness.stream.recording import RecordingWriter, record_capture
 
     plan = _plan_note(args)

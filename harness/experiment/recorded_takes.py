@@ -26,7 +26,7 @@ from harness.mocap import LibraryFolders
 from harness.score import WARM_UP_S, LoopFrames
 from harness.simulate import sampling_times_s
 from harness.stream import TrackerFrame
-from harness.stream.is900.codec import STATION_CHARACTERS, DeviceSamples
+from harness.stream.polhemus.codec import STATION_CHARACTERS, DeviceSamples
 from harness.stream.recording import EXPECTED_FILE, RecordingStream
 
 RATE_TOLERANCE = 0.02

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol, runtime_checkable
 
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.reader import WireFormat
+from harness.stream.polhemus.codec.reader import WireFormat
 
 LineEventKind = Literal[
     "connected",  # streaming, for the first time or again
@@ -22,6 +22,7 @@ LineEventKind = Literal[
     "present",  # a station that was missing sends again
     "unexpected",  # a station that the session did not ask for was switched on
     "out of range",  # a station is farther away than the output list can report
+    "device error",  # records carry an error of the device's own tests
     "settings",  # another program left settings in the device, or they are put back
     "refused",  # the device that came back cannot be used as it is
 ]

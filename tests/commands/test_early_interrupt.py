@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 import pytest
 
 from harness.commands.output import progress_note, recording_note
-from harness.stream.is900.codec import WireFormat
+from harness.stream.polhemus.codec import WireFormat
 from harness.stream.recording import RecordingStream, RecordingWriter, record_capture
 from tests.command import Command
 from tests.stream.wire import FOUR, device_bytes, in_chunks, stamps_s

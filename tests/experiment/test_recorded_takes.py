@@ -16,7 +16,7 @@ from harness.experiment.playback import Playback, prepare_playback
 from harness.experiment.recorded_takes import find_playback, frame_numbers, recorded_take
 from harness.experiment.scenarios.scenario_reader import find_scenario
 from harness.stream.is900 import Device
-from harness.stream.is900.codec import BINARY, CENTIMETRES, STOP, STREAM, ZERO_CLOCK, WireFormat, station_command
+from harness.stream.polhemus.codec import BINARY, CENTIMETRES, STOP, STREAM, ZERO_CLOCK, WireFormat, station_command
 from harness.stream.recording import RecordingStream, RecordingWriter, record_capture
 from tests.stream.wire import frames_equal
 

@@ -36,7 +36,7 @@ from harness.results import INDEX_FILE, load_run, read_summary
 from harness.results.findings import read_findings, read_placement
 from harness.simulate.physics import read_mcf
 from harness.stream import LineEvent, PoseFileOptions, StreamSummary, format_csv_row, frame_rows, measure_sampling
-from harness.stream.is900 import DEFAULT_EMITTERS
+from harness.stream.polhemus import DEFAULT_EMITTERS
 from harness.stream.recording import (
     PoseLogStream,
     RecordingStream,

@@ -10,8 +10,8 @@ from typing import Any
 
 from harness.errors import BadInput, HarnessError
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.reader import WireFormat
 from harness.stream.line_events import EventCounter, LineEvent, TrackedBodies
+from harness.stream.polhemus.codec.reader import WireFormat
 from harness.stream.ports import TrackerConfig, open_tracker_at
 from harness.stream.recording.blocks import POSES, RECEIVED
 from harness.stream.recording.pose_writer import PoseRecordingWriter

@@ -40,8 +40,8 @@ from harness.core.interrupts import defer_interrupts
 from harness.core.output_place import place_fault
 from harness.core.parsing import parse_json
 from harness.errors import BadFile, HarnessError, SystemFault, shorten, was_interrupted
-from harness.stream.is900.codec.reader import ByteCapture, WireFormat
 from harness.stream.line_events import LineEvent
+from harness.stream.polhemus.codec.reader import ByteCapture, WireFormat
 from harness.stream.recording.blocks import (
     ANSWERED,
     CONFIGURED,
@@ -299,8 +299,8 @@ class RecordingWriter:
         """
         self._keep_stations(wire.stations)
         content = asdict(wire) | {"characters": wire.characters.decode("latin-1")}
-        for name, usual in (("zeroed", True), ("datagrams", False)):
-            if content[name] is usual:
+        for name, usual in (("zeroed", True), ("datagrams", False), ("family", "is900")):
+            if content[name] == usual:
                 del content[name]  # earlier versions refuse a key that they do not know
         self._append_json(CONFIGURED, content, monotonic_s, wall_s)
         self.counts[CONFIGURED] += 1

@@ -16,7 +16,7 @@ import numpy as np
 
 from harness.errors import BadFile, BadInput
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.reader import ByteCapture, ContinuousFrameReader, WireFormat
+from harness.stream.polhemus.codec.reader import ByteCapture, ContinuousFrameReader, WireFormat
 from harness.stream.recording.blocks import CONFIGURED, RECEIVED
 from harness.stream.recording.recording import EXPECTED_FILE, Recording, read_recording
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.errors import BadFile, BadInput
 from harness.measure import MeasuredPoses, mean_period_s
-from harness.stream.is900.codec import WireFormat
+from harness.stream.polhemus.codec import WireFormat
 from harness.stream.recording import CaptureReader, StationReadings
 
 

@@ -31,7 +31,7 @@ from harness.measure.reports import (
     estimated_poses,
     residual_series,
 )
-from harness.stream.is900.codec import BITS_PER_BYTE, WireFormat, record_size
+from harness.stream.polhemus.codec import BITS_PER_BYTE, WireFormat, record_size
 from harness.stream.recording import RecordingStream, StationReadings
 from harness.study.trust.capture_readings import CaptureReadings, measured_poses
 from harness.study.trust.characterization import correct_departures, preset_components, preset_values

@@ -8,9 +8,9 @@ import pytest
 
 from harness.errors import BadFile, BadInput
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.reader import WireFormat
 from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.line_events import LineEvent, TrackedBodies
+from harness.stream.polhemus.codec.reader import WireFormat
 from harness.stream.poses.pose_log import FileFinding
 from harness.stream.recording.guided_capture import finished_stretches
 from harness.stream.recording.pose_recording import read_pose_recording

@@ -15,9 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.errors import BadFile, SystemFault
-from harness.stream.is900.codec.reader import ByteCapture, WireFormat
-from harness.stream.is900.codec.records import RecordFormat
 from harness.stream.line_events import LineEvent
+from harness.stream.polhemus.codec.reader import ByteCapture, WireFormat
+from harness.stream.polhemus.codec.records import RecordFormat
 from harness.stream.recording.blocks import (
     BLOCK_MARKER,
     CONFIGURED,
@@ -289,7 +289,7 @@ def test_a_full_disk_is_reported() -> None:
 
 ENDLESS_WRITER = """
 import sys
-from harness.stream.is900.codec.reader import WireFormat
+from harness.stream.polhemus.codec.reader import WireFormat
 from harness.stream.recording.recording import RecordingWriter
 writer = RecordingWriter(sys.argv[1], {"source": "a test"})
 writer.on_configured(WireFormat(("head",), 40.0), 0.0, 0.0)
