@@ -12,11 +12,10 @@ if TYPE_CHECKING:
     from harness.measure.handeye import PosePairs, most_likely_hand_eye
     from harness.measure.log_profile import measure_log_profile
     from harness.measure.noise_spectra import ErrorSpectrum, measure_allan, measure_spectrum, pool_spectra
-    from harness.measure.pose_directions import pair_at, same_directions
+    from harness.measure.pose_directions import LEAST_OVERLAP_S, pair_at, same_directions
     from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
     from harness.measure.profile import Bar, QualityClass, StretchLength, UnitProfile, measure_profile
     from harness.measure.registration import (
-        LEAST_OVERLAP_S,
         Registration,
         StationResiduals,
         register_poses,

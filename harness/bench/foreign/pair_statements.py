@@ -131,7 +131,8 @@ def _median(solutions: list[HandEye]) -> Floats:
     quaternions = rotations.from_matrix(mounts[:, :3, :3])
     angles = rotations.angle_between_rad(quaternions[:, None], quaternions[None])
     middle = quaternions[int(np.argmin(np.sum(angles, axis=1)))]
-    return references.pose_matrices(np.median(mounts[:, :3, 3], axis=0)[None], middle[None])[0]
+    out: Floats = references.pose_matrices(np.median(mounts[:, :3, 3], axis=0)[None], middle[None])[0]
+    return out
 
 
 def _distance(mount: Floats, other: Floats) -> tuple[float, float]:

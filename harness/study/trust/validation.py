@@ -98,7 +98,8 @@ def validate_capture(
     readings, wire = capture.readings, capture.wire
     poses, unseen = _comparable_poses(capture, truth)
     progress("registration", 1, 3)
-    bodies, directions = truth.bodies, ()
+    bodies: Mapping[str, TruthPoses] = truth.bodies
+    directions: tuple[str, ...] = ()
     if wire is None and truth.is_log:
         named = {station: truth.body_of[station] for station in poses}
         poses, bodies, directions = same_directions(poses, truth.bodies, named)
