@@ -14,12 +14,9 @@ from harness.core.arrays import Floats
 from harness.measure.angular_speed import coarse_offset
 from harness.measure.handeye import PosePairs, pair_residuals, solve_trimmed
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
-from harness.measure.sampling import mean_period_s
 
 FAR_MOUNT_M = 0.5
 """Distance of two frames on one body from which on the inverse poses are considered [m] [choice]."""
-LEAST_OVERLAP_S = 10.0
-"""Shortest common motion [s]."""
 CLEAR_FACTOR = 3.0
 """Factor by which inverse poses must leave less, or give a shorter mount, to be believed [choice]."""
 
@@ -86,9 +83,8 @@ def find_directions(
     NotComparable for motion about one axis and for little overlap.
     """
     named = {station: stations[station] for station in pairs}
-    period_s = mean_period_s([one.measured_s for one in named.values()])
     splines = {station: TruthSpline(truths[body]) for station, body in pairs.items()}
-    offset_s = coarse_offset(named, splines, period_s, LEAST_OVERLAP_S).offset_s
+    offset_s = coarse_offset(named, splines).offset_s
     found = [
         _candidate(named, truths, pairs, offset_s, capture, truth)
         for capture in (False, True)

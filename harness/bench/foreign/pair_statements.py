@@ -20,7 +20,6 @@ from harness.measure import (
     TruthSpline,
     measure_allan,
     most_likely_hand_eye,
-    pair_at,
 )
 from harness.results.findings import BenchmarkStatement
 from harness.stream.recording import open_poses
@@ -123,10 +122,8 @@ def _keyframes(pair: ComparedPair) -> PosePairs:
     near = np.abs(used_s[np.clip(np.searchsorted(used_s, truth_s - 1e-4), 0, len(used_s) - 1)] - truth_s) < 1e-3
     rows = np.flatnonzero(near & pair.station.valid)
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, references.KEYFRAMES).astype(int))]
-    at = MeasuredPoses(
-        truth_s[rows], pair.station.position_m[rows], pair.station.tracker_from_station[rows], np.ones(len(rows), bool)
-    )
-    return pair_at(at, TruthSpline(pair.truth), 0.0)
+    body_m, body = TruthSpline(pair.truth).poses(truth_s[rows])
+    return PosePairs(pair.station.position_m[rows], pair.station.tracker_from_station[rows], body_m, body)
 
 
 def _median(solutions: list[HandEye]) -> Floats:
