@@ -105,11 +105,13 @@ def _read_file(path: Path, options: PoseFileOptions) -> PoseLog:
         return _read_matrices(head, options)
     columns = find_columns(head, options.columns)
     needed = [c for body in columns.bodies for c in (*body.position, *body.quaternion)]
-    time = columns.time if columns.time is not None else columns.frame
-    table = read_rows(head, [time, *needed] if time is not None else needed, columns.body)
+    clock = [c for c in (columns.time, columns.nanoseconds) if c is not None]
+    clock = clock or [c for c in (columns.frame,) if c is not None]
+    table = read_rows(head, [*clock, *needed], columns.body)
     counted = np.arange(len(table.numbers), dtype=np.float64)
-    times = counted if time is None else table.numbers[:, 0]
-    poses = table.numbers if time is None else table.numbers[:, 1:]
+    times, poses = counted if not clock else table.numbers[:, 0], table.numbers[:, len(clock) :]
+    if len(clock) > 1:
+        times = times + 1e-9 * table.numbers[:, 1]
     findings = [FileFinding("kind", f"rows of numbers, {head.form}", "the file's lines"), *columns.findings]
     if table.left_out:
         findings.append(FileFinding("left out", ", ".join(table.left_out), "they are no rows"))
@@ -214,6 +216,7 @@ def _conclude_clock(
         counted = numbered = True
     if counted:
         what = "no times, but numbers of samples" if numbered else "no times"
+        what += f", but text in the column {columns.text_time!r}" if columns.text_time else ""
         rate_hz = options.rate_hz or columns.rate_hz
         if options.time_unit is not None:
             raise BadInput(f"--time-unit, but {path.name} has {what}.", "Give --rate HZ instead.")

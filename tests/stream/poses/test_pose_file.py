@@ -72,6 +72,13 @@ def test_a_file_without_times_needs_a_rate(name: str, tmp_path: Path) -> None:
     assert untimed.duration_s == COUNT - 1.0
 
 
+def test_times_as_text_are_named(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", rows(lambda n: f"12:30:{n},{pose(n)}", [HEADER]))
+    with pytest.raises(UnknownRate, match=r"a.csv has no times, but text in the column 't'"):
+        read_pose_log(path)
+    assert_motion(read_pose_log(path, PoseFileOptions(rate_hz=RATE_HZ)).bodies[0])
+
+
 def test_unix_times_are_kept(tmp_path: Path) -> None:
     for content, unit in ((tum(), "s"), (euroc(), "ns")):
         log = read_pose_log(write(tmp_path / "a", content))
