@@ -42,8 +42,8 @@ class ColumnName:
     """The meaning of a column's name."""
 
     kind: str
-    """`time`, `nanoseconds` (beside whole seconds, as in ROS), `frame`, `body`, `position`, `quaternion`, `angle`, or ""
-    for others."""
+    """`time`, `nanoseconds` (beside seconds, as in ROS), `frame`, `body`, `position`, `quaternion`, `angle`, or
+    "" for others."""
     axis: str = ""
     """`x`, `y`, `z` or `w`; for a time the word that names it."""
     body: str = ""

@@ -20,6 +20,7 @@ from harness.stream.poses.evidence import (
     UNIX_S,
     conclude_length_unit,
     conclude_quaternion_order,
+    conclude_resolution,
     conclude_time_unit,
     counts_samples,
 )
@@ -238,6 +239,8 @@ def _conclude_clock(
         length_s = scale_s * (times[-1] - times[0])
     if not length_s <= _LONGEST_S:
         raise BadFile(path, f"times that span {length_s:.3g} s", EXPECTED_FILE, "Are columns and --time-unit right?")
+    if resolution := conclude_resolution(times, scale_s):
+        findings.append(resolution)
     unix = UNIX_S[0] <= times[0] * scale_s <= UNIX_S[1]
     return scale_s, "Unix time" if unix else "seconds from an unknown start"
 
