@@ -48,6 +48,8 @@ def add_characterize(verbs: Verbs) -> None:
     verb.add_argument("--length", type=parse_pair, metavar="MM,MM", help=text)
     text = "points, x y z [m] a line, on which one station rests in this order"
     verb.add_argument("--surveyed", type=Path, metavar="FILE", help=text)
+    text = "--surveyed: standard uncertainty of a coordinate of the points"
+    verb.add_argument("--surveyed-noise", type=positive_float, metavar="MM", help=text)
     text = f"port: minutes at rest (default {_DEFAULT_STATIC_MIN:g})"
     verb.add_argument("--minutes", type=positive_float, metavar="M", help=text)
     verb.add_argument("--yes", action="store_true", default=None, help="port: do not wait for Enter between stretches")
@@ -68,6 +70,9 @@ def run_characterize(args: argparse.Namespace) -> Outcome:
     options = UnitOptions(args.out, args.expect, args.force)
     expected, bar = read_expected(options), _parse_bar(args.rigid, args.length)
     points_m = read_surveyed_points(args.surveyed) if args.surveyed else None
+    deviation_m = 1e-3 * (args.surveyed_noise or 0.0)
+    if deviation_m and points_m is None:
+        raise BadInput("--surveyed-noise without --surveyed.", "Name the file of the points.")
     is_log = not _is_port(args.source) and holds_poses(Path(args.source))
     if is_log:
         refuse_flags(args, _PORT_ALONE, f"with the poses {args.source}", "It is for a port: leave it out.")
@@ -79,7 +84,7 @@ def run_characterize(args: argparse.Namespace) -> Outcome:
         else:
             found = characterize_capture(CaptureReader(source), expected=expected, bar=bar, progress=progress)
     if points_m is not None:
-        found = replace(found, survey=compare_with_survey(found.profile.places, points_m))
+        found = replace(found, survey=compare_with_survey(found.profile.places, points_m, deviation_m))
     page = unit_page(found.report, this_command(), options.out.name if options.out else "")
     lines, written = write_unit(options, found.unit, page)
     content = {

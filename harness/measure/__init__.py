@@ -12,11 +12,10 @@ if TYPE_CHECKING:
     from harness.measure.handeye import PosePairs, most_likely_hand_eye
     from harness.measure.log_profile import measure_log_profile
     from harness.measure.noise_spectra import ErrorSpectrum, measure_allan, measure_spectrum, pool_spectra
-    from harness.measure.pose_directions import pair_at, same_directions
+    from harness.measure.pose_directions import same_directions
     from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
     from harness.measure.profile import Bar, QualityClass, StretchLength, UnitProfile, measure_profile
     from harness.measure.registration import (
-        LEAST_OVERLAP_S,
         Registration,
         StationResiduals,
         register_poses,
@@ -24,15 +23,15 @@ if TYPE_CHECKING:
     )
     from harness.measure.rigid_pair import RigidPair
     from harness.measure.sampling import describe_sampling, mean_period_s
-    from harness.measure.surveyed_points import compare_with_survey
+    from harness.measure.surveyed_points import SurveyComparison, compare_with_survey
     from harness.measure.timing import TIMING_KEYS
+    from harness.measure.uncertainty import UncertaintyBudget
     from harness.measure.unit_file import CUT_ADVICE, UNIT_FILE, UnitFile, read_unit_file, write_unit_file
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
 __all__ = [
     "CUT_ADVICE",
-    "LEAST_OVERLAP_S",
     "NOISE_KEYS",
     "TIMING_KEYS",
     "UNIT_FILE",
@@ -47,8 +46,10 @@ __all__ = [
     "RigidPair",
     "StationResiduals",
     "StretchLength",
+    "SurveyComparison",
     "TruthPoses",
     "TruthSpline",
+    "UncertaintyBudget",
     "UnitFile",
     "UnitProfile",
     "coarse_offset",
@@ -64,7 +65,6 @@ __all__ = [
     "measure_profile",
     "measure_spectrum",
     "most_likely_hand_eye",
-    "pair_at",
     "pool_spectra",
     "read_unit_file",
     "register_poses",

@@ -20,7 +20,8 @@ LEAST_GAIN = 0.1
 SPAN_S = 0.2
 """Time over which angular speeds are means [s]: over single steps, noise and rounded times hide them [choice]."""
 _FEWEST_STEPS = 20
-_LEAST_OVERLAP_S = 10.0
+LEAST_OVERLAP_S = 10.0
+"""Shortest common motion of capture and reference [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,9 +138,12 @@ def _parabola(values: Floats, best: int) -> float:
 
 
 def coarse_offset(
-    stations: Mapping[str, MeasuredPoses], splines: Mapping[str, TruthSpline], period_s: float, least_overlap_s: float
+    stations: Mapping[str, MeasuredPoses],
+    splines: Mapping[str, TruthSpline],
+    least_overlap_s: float = LEAST_OVERLAP_S,
 ) -> TimeOffset:
     """Offset of the device's clock from that of the reference, from the angular speeds of all stations."""
+    period_s = mean_period_s([station.measured_s for station in stations.values()])
     measured = [angular_speed(station.orientations(), period_s) for station in stations.values()]
     expected = [angular_speed(splines[name], period_s) for name in stations]
     return time_offset(measured, expected, least_overlap_s=least_overlap_s)
@@ -158,11 +162,10 @@ def identify_stations(
     if len(names) < 2 or len(bodies) < len(names):
         return dict(stated)
     splines = {body: TruthSpline(truths[body]) for body in bodies}
-    period_s = mean_period_s([station.measured_s for station in stations.values()])
 
     def correlations(worn: Mapping[str, str]) -> Floats:
         on = {name: splines[body] for name, body in worn.items()}
-        offset_s = coarse_offset({name: stations[name] for name in worn}, on, period_s, _LEAST_OVERLAP_S).offset_s
+        offset_s = coarse_offset({name: stations[name] for name in worn}, on).offset_s
         return np.array([_correlations(stations[name], splines, offset_s) for name in names])
 
     rows, own = np.arange(len(names)), [bodies.index(stated[name]) for name in names]

@@ -18,13 +18,13 @@ MOST_TURN_RAD = math.radians(15.0)
 MOST_PLACE_M = 0.05
 """Largest median error of a station's positions with which a registration is believed [m] [choice]."""
 MOST_PLACE_SHARE = 0.15
-"""The same, relative to the extent of the motion: odometry that drifts errs more on a longer way [choice]."""
+"""Largest such error relative to the extent of the motion: drifting odometry errs more on a longer way [choice]."""
 MOST_HEADING_RAD = math.radians(30.0)
 """Largest heading error that counts as one of a tracker [rad] [choice]."""
 MOST_CLOCK_ERROR = 500e-6
 """Largest relative error of a clock's rate that counts as one of a device; quartz errs by less than 200e-6 [choice]."""
 MOST_PLAIN_CLOCK_ERROR = 0.01
-"""The same of two sources of unknown clocks; a larger one is a wrong rate [choice]."""
+"""Largest relative error between two sources of unknown clocks; a larger one is a wrong rate [choice]."""
 UNITS_M = {
     "micrometres": 1e-6, "millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "decimetres": 0.1, "feet": 0.3048,
     "kilometres": 1e3,

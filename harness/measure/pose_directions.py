@@ -14,12 +14,11 @@ from harness.core.arrays import Floats
 from harness.measure.angular_speed import coarse_offset
 from harness.measure.handeye import PosePairs, pair_residuals, solve_trimmed
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
-from harness.measure.sampling import mean_period_s
 
 FAR_MOUNT_M = 0.5
 """Distance of two frames on one body from which on the inverse poses are considered [m] [choice]."""
-LEAST_OVERLAP_S = 10.0
-"""Shortest common motion [s]."""
+_MOST_PAIRS = 5000
+"""About the most pairs of a station that directions are told by."""
 CLEAR_FACTOR = 3.0
 """Factor by which inverse poses must leave less, or give a shorter mount, to be believed [choice]."""
 
@@ -86,9 +85,8 @@ def find_directions(
     NotComparable for motion about one axis and for little overlap.
     """
     named = {station: stations[station] for station in pairs}
-    period_s = mean_period_s([one.measured_s for one in named.values()])
     splines = {station: TruthSpline(truths[body]) for station, body in pairs.items()}
-    offset_s = coarse_offset(named, splines, period_s, LEAST_OVERLAP_S).offset_s
+    offset_s = coarse_offset(named, splines).offset_s
     found = [
         _candidate(named, truths, pairs, offset_s, capture, truth)
         for capture in (False, True)
@@ -121,16 +119,17 @@ def _candidate(
     for name, body in pairs.items():
         station = inverted_poses(stations[name]) if capture else stations[name]
         spline = TruthSpline(inverted_truth(truths[body]) if truth else truths[body])
-        paired.append(pair_at(station, spline, offset_s))
+        paired.append(_pair_at(station, spline, offset_s))
     state = solve_trimmed(paired, with_scale=False)
     turns = [np.linalg.norm(pair_residuals(one, state, s)[1], axis=1) for s, one in enumerate(paired)]
     longest_m = float(np.linalg.norm(state.mount_m, axis=1).max())
     return _Candidate(capture, truth, float(np.median(np.concatenate(turns))), longest_m)
 
 
-def pair_at(station: MeasuredPoses, spline: TruthSpline, offset_s: float) -> PosePairs:
-    """The records that have a reference at an offset of the clocks [s], and the reference's poses there."""
+def _pair_at(station: MeasuredPoses, spline: TruthSpline, offset_s: float) -> PosePairs:
+    """Evenly spread records with a reference at an offset of the clocks [s], and the reference's poses there."""
     rows = np.flatnonzero(station.valid & np.isfinite(station.measured_s))
     rows = rows[spline.covers(station.measured_s[rows] - offset_s)]
+    rows = rows[:: len(rows) // _MOST_PAIRS + 1]
     body_m, body = spline.poses(station.measured_s[rows] - offset_s)
     return PosePairs(station.position_m[rows], station.tracker_from_station[rows], body_m, body)

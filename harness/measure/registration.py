@@ -9,7 +9,7 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
 from harness.core.number_format import CHI_QUANTILE, NORMAL_QUANTILE, Interval
 from harness.errors import BadInput, NotComparable
-from harness.measure.angular_speed import TimeOffset, coarse_offset
+from harness.measure.angular_speed import LEAST_OVERLAP_S, TimeOffset, coarse_offset
 from harness.measure.conventions import (
     MOST_CLOCK_ERROR,
     MOST_PLACE_M,
@@ -22,7 +22,6 @@ from harness.measure.conventions import (
 )
 from harness.measure.gauss_markov import ErrorProcess
 from harness.measure.handeye import PosePairs, solve_trimmed
-from harness.measure.pose_directions import LEAST_OVERLAP_S
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline, require_pairs
 from harness.measure.reference_noise import correct_for_reference
 from harness.measure.registration_fit import FittedRegistration, StationGrid, fit_registration
@@ -200,7 +199,7 @@ def register_poses(
     chosen = {station: stations[station] for station in named}
     require_stamps(chosen)
     period_s = mean_period_s([station.measured_s for station in chosen.values()])
-    coarse = coarse_offset(chosen, splines, period_s, least_overlap_s)
+    coarse = coarse_offset(chosen, splines, least_overlap_s)
     if not coarse.correlation >= LEAST_CORRELATION:
         raise BadInput(
             f"Angular speeds of capture and reference correlate by {coarse.correlation:.2f} at best.",

@@ -270,7 +270,7 @@ _BY_ORIENTATIONS = [0, 1, 2, OFFSET, CLOCK]
 def _move_reference(
     state: RegistrationState, covariance: Floats, information: Floats, fixed: Sequence[int]
 ) -> tuple[RegistrationState, Floats]:
-    """The same clocks, whose offset holds where their rate does not move it: as one finds it without the rate."""
+    """Move the time of the offset to where the clocks' rate does not change it: as one finds it without the rate."""
     free = _free(len(information), fixed)
     inverse = np.linalg.pinv(information[np.ix_(free, free)], rcond=1e-13)
     offset, clock = free.index(OFFSET), free.index(CLOCK)

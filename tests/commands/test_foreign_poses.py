@@ -53,6 +53,7 @@ def test_stations_that_are_not_there_and_flags_of_others_are_refused(pair: tuple
     assert "It has phone" in command("validate", pair[0], "--truth", pair[1], "--stations", "head", code=2).err
     assert "--minutes" in command("characterize", pair[0], "--minutes", "3", code=2).err
     assert "--rigid" in command("characterize", pair[0], "--length", "300,0.1", code=2).err
+    assert "without --surveyed" in command("characterize", pair[0], "--surveyed-noise", "1", code=2).err
 
 
 def test_rests_on_surveyed_points(tmp_path: Path, command: Command) -> None:
@@ -67,8 +68,10 @@ def test_rests_on_surveyed_points(tmp_path: Path, command: Command) -> None:
     place = place + np.array([1.0, 2.0, 0.5]) + 0.0004 * rng.normal(size=place.shape)
     turn = np.roll(rotations.exp(0.001 * rng.normal(size=place.shape)), -1, axis=1)
     np.savetxt(tmp_path / "probe.csv", np.column_stack([time_s, place, turn]), delimiter=",", fmt="%.6f")
-    said = command("characterize", tmp_path / "probe.csv", "--surveyed", tmp_path / "points.txt")
+    words = ("characterize", tmp_path / "probe.csv", "--surveyed", tmp_path / "points.txt", "--surveyed-noise", "0.2")
+    said = command(*words)
     assert "point 5" in said.out
+    assert "surveyed points (type B)" in said.out
     assert "expanded uncertainty" in said.out
     (tmp_path / "points.txt").write_text("0 0 0\n1 0\n")
     assert (

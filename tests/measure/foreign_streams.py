@@ -72,4 +72,5 @@ def _reference(rng: np.random.Generator, truth: TruthPoses, source: Source) -> T
 def resting_times(rng: np.random.Generator, seconds: float, low_s: float = 0.01, high_s: float = 0.0233) -> Floats:
     """Times with uneven steps [s]."""
     steps = rng.uniform(low_s, high_s, round(2.0 * seconds / (low_s + high_s)))
-    return np.cumsum(steps) - steps[0]
+    out: Floats = np.cumsum(steps) - steps[0]
+    return out

@@ -11,7 +11,7 @@ from harness.bench.foreign.streams import StreamPair
 from harness.bench.limits import hold_to_limit, state_verdict
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.number_format import Interval
+from harness.core.number_format import Interval, format_fixed
 from harness.errors import BadInput
 from harness.measure import (
     MeasuredPoses,
@@ -20,7 +20,6 @@ from harness.measure import (
     TruthSpline,
     measure_allan,
     most_likely_hand_eye,
-    pair_at,
 )
 from harness.results.findings import BenchmarkStatement
 from harness.stream.recording import open_poses
@@ -73,13 +72,17 @@ def pair_statements(pair: StreamPair) -> list[BenchmarkStatement]:
 def _offset(pair: ComparedPair) -> list[BenchmarkStatement]:
     found = pair.found.registration.values["time_offset_orientation_s"]
     grid_s = references.search_offset(pair.station, pair.truth, found.value)
-    text = f"{pair.name}: time offset by orientation, difference from the grid search"
-    about = f"{found.scaled(1e3, 'ms')} and {1e3 * grid_s:.2f} ms"
+    text = f"{pair.name}: offset, from that of the grid search"
+    about = f"{found.scaled(1e3, 'ms')}; {format_fixed(1e3 * grid_s, 2)} ms"
     return [hold_to_limit(text, 1e3 * abs(found.value - grid_s), "ms", most=MOST_OFFSET_MS, reference=about)]
 
 
 def _mount(pair: ComparedPair) -> list[BenchmarkStatement]:
-    """The mount with the scale fixed to 1 beside OpenCV's, on the same evenly spaced pairs of poses."""
+    """The mount with the scale fixed to 1 beside OpenCV's, on the same evenly spaced pairs of poses.
+
+    The residual is the geometric mean of the RMS of positions and of orientations, which the likeliest solution makes
+    least where nobody knows the size of both errors.
+    """
     pairs = _keyframes(pair)
     station = references.pose_matrices(pairs.position_m, pairs.tracker_from_station)
     body = references.pose_matrices(pairs.body_m, pairs.world_from_body)
@@ -94,19 +97,19 @@ def _mount(pair: ComparedPair) -> list[BenchmarkStatement]:
     apart = [_distance(one.mount, centre) for one in theirs.values()]
     apart_mm, apart_deg = max(place for place, _ in apart), max(turn for _, turn in apart)
     mine_mm, mine_deg = _distance(ours.mount, centre)
-    about = f"{len(theirs)} solvers of OpenCV within {apart_mm:.1f} mm and {apart_deg:.2f} deg of their median"
+    about = f"{len(theirs)} solvers within {apart_mm:.1f} mm, {apart_deg:.2f} deg"
     if apart_mm <= AGREE_MM and apart_deg <= AGREE_DEG:
         met = mine_mm <= AGREE_MM and mine_deg <= AGREE_DEG
         target = f"<= {AGREE_MM:g} mm, {AGREE_DEG:g} deg"
-        text = f"{pair.name}: mount, distance from the median of OpenCV's"
+        text = f"{pair.name}: mount, from OpenCV's median"
         return [state_verdict(text, target, f"{mine_mm:.2f} mm, {mine_deg:.3f} deg", met, about)]
     left = {name: references.hand_eye_residuals(station, body, one) for name, one in theirs.items()}
     best = min(left, key=lambda name: math.prod(left[name]))
     (place_m, turn_rad), (other_m, other_rad) = references.hand_eye_residuals(station, body, ours), left[best]
     figures = f"{1e3 * place_m:.2f} mm {math.degrees(turn_rad):.3f} deg"
-    about += f"; least, {best}: {1e3 * other_m:.2f} mm {math.degrees(other_rad):.3f} deg; ours: {figures}"
+    about += f"; {best} {1e3 * other_m:.2f} mm {math.degrees(other_rad):.3f} deg, ours {figures}"
     ratio = math.sqrt(place_m * turn_rad / (other_m * other_rad))
-    text = f"{pair.name}: mount, residual of position x orientation / OpenCV's least"
+    text = f"{pair.name}: mount, residual / OpenCV's least"
     return [hold_to_limit(text, ratio, "x", most=1.0, reference=about)]
 
 
@@ -119,10 +122,8 @@ def _keyframes(pair: ComparedPair) -> PosePairs:
     near = np.abs(used_s[np.clip(np.searchsorted(used_s, truth_s - 1e-4), 0, len(used_s) - 1)] - truth_s) < 1e-3
     rows = np.flatnonzero(near & pair.station.valid)
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, references.KEYFRAMES).astype(int))]
-    at = MeasuredPoses(
-        truth_s[rows], pair.station.position_m[rows], pair.station.tracker_from_station[rows], np.ones(len(rows), bool)
-    )
-    return pair_at(at, TruthSpline(pair.truth), 0.0)
+    body_m, body = TruthSpline(pair.truth).poses(truth_s[rows])
+    return PosePairs(pair.station.position_m[rows], pair.station.tracker_from_station[rows], body_m, body)
 
 
 def _median(solutions: list[HandEye]) -> Floats:
@@ -131,7 +132,8 @@ def _median(solutions: list[HandEye]) -> Floats:
     quaternions = rotations.from_matrix(mounts[:, :3, :3])
     angles = rotations.angle_between_rad(quaternions[:, None], quaternions[None])
     middle = quaternions[int(np.argmin(np.sum(angles, axis=1)))]
-    return references.pose_matrices(np.median(mounts[:, :3, 3], axis=0)[None], middle[None])[0]
+    out: Floats = references.pose_matrices(np.median(mounts[:, :3, 3], axis=0)[None], middle[None])[0]
+    return out
 
 
 def _distance(mount: Floats, other: Floats) -> tuple[float, float]:
@@ -159,7 +161,9 @@ def _spread(pair: ComparedPair) -> list[BenchmarkStatement]:
     spread = f"{own_mm:.1f} mm, {own_deg:.2f} deg, of {share:.1f} % of the positions"
     return [
         _figure(
-            f"{pair.name}: scale error", registration.values["scale"].scaled(100.0, "%"), f"evo {1e2 * scale:.2f} %"
+            f"{pair.name}: scale error",
+            registration.values["scale"].scaled(100.0, "%"),
+            f"evo {format_fixed(1e2 * scale, 2)} %",
         ),
         state_verdict(
             f"{pair.name}: spread (RMS)", "", spread, None, f"evo {1e3 * rms_m:.1f} mm", value=own_mm, unit="mm"
@@ -177,7 +181,7 @@ def _clock(pair: ComparedPair) -> list[BenchmarkStatement]:
 
 
 def _allan(pair: ComparedPair) -> list[BenchmarkStatement]:
-    """Allan deviation of the errors of the position, of the longest stretch without a gap at an even rate."""
+    """Allan deviation of the errors of the position, of the longest stretch without a gap, linearly resampled."""
     errors = next(iter(pair.found.registration.errors.values()))
     time_s, values = errors.truth_s[errors.valid], errors.position_m[errors.valid]
     edges = np.flatnonzero(np.diff(time_s) > 0.5) + 1
@@ -191,10 +195,10 @@ def _allan(pair: ComparedPair) -> list[BenchmarkStatement]:
     others = references.allantools_deviation(even, _ALLAN_HZ, found.tau_s[known])
     worst = float(np.max(np.abs(found.deviation[known] / others - 1.0)))
     tau_s, at = found.tau_s[known], int(np.argmin(np.abs(found.tau_s[known] - 1.0)))
-    text = f"{pair.name}: Allan deviation of the errors, largest difference from allantools"
+    text = f"{pair.name}: Allan deviation, from allantools"
     figures = f"{1e3 * found.deviation[known][at]:.3g} and {1e3 * others[at]:.3g} mm at {tau_s[at]:.2g} s"
-    about = f"{figures}, both of one linear resampling to {_ALLAN_HZ:g} Hz"
-    return [hold_to_limit(text, 100.0 * worst, "%", most=100.0 * MOST_ALLAN, reference=about)]
+    about = f"{figures}, {_ALLAN_HZ:g} Hz"
+    return [hold_to_limit(text, round(100.0 * worst, 6), "%", most=100.0 * MOST_ALLAN, reference=about)]
 
 
 def _shares(pair: ComparedPair) -> list[BenchmarkStatement]:
@@ -202,8 +206,8 @@ def _shares(pair: ComparedPair) -> list[BenchmarkStatement]:
     place, turn = next(iter(registration.explained.values()))
     return [
         state_verdict(
-            f"{pair.name}: variance that the model explains", "",
-            f"{100.0 * place:.2f} % of positions, {100.0 * turn:.2f} % of orientations", None,
+            f"{pair.name}: variance explained", "",
+            f"{format_fixed(1e2 * place, 2)} % of positions, {format_fixed(1e2 * turn, 2)} % of orientations", None,
             f"matched {100.0 * registration.matched:.1f} %, correlation {registration.correlation:.3f}", value=place,
         )
     ]  # fmt: skip

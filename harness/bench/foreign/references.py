@@ -97,8 +97,13 @@ def opencv_solutions(station: Floats, body: Floats) -> dict[str, HandEye]:
         )  # fmt: skip
         mount = _join(own_turn, own_place)
         if np.isfinite(mount).all():
-            found[name.lower()] = HandEye(np.linalg.inv(mount), _join(turn, place))
+            found[name.lower()] = HandEye(_inverse(mount), _join(turn, place))
     return found
+
+
+def _inverse(matrix: Floats) -> Floats:
+    out: Floats = np.linalg.inv(matrix).astype(np.float64)
+    return out
 
 
 def _join(turn: Floats, place: Floats) -> Floats:

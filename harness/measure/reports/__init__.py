@@ -28,8 +28,6 @@ if TYPE_CHECKING:
         estimated_poses,
         residual_series,
     )
-    from harness.measure.surveyed_points import SurveyComparison
-    from harness.measure.uncertainty import UncertaintyBudget
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
@@ -47,8 +45,6 @@ __all__ = [
     "ResidualSeries",
     "StationAccuracy",
     "StationFigures",
-    "SurveyComparison",
-    "UncertaintyBudget",
     "UnitReport",
     "ValidationReport",
     "compare_with_expected",

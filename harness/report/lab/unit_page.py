@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_fixed, format_share
-from harness.measure import QualityClass, RigidPair, StretchLength
+from harness.measure import QualityClass, RigidPair, StretchLength, SurveyComparison, UncertaintyBudget
 from harness.measure.reports import (
     STATION_FIGURES,
     CaptureSummary,
@@ -16,8 +16,6 @@ from harness.measure.reports import (
     ParameterRow,
     RecordingAdvice,
     StationFigures,
-    SurveyComparison,
-    UncertaintyBudget,
     UnitReport,
 )
 from harness.report.kit.page import Block, Bullets, DataTable, Drawing, Page, Prose, Section

@@ -9,7 +9,8 @@ from harness.core.units import LENGTH_UNITS_M, TIME_UNITS_S, find_unit
 AXES = ("x", "y", "z")
 _BRACKET = re.compile(r"[\[(]([^\])]*)[\])]")
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_a-zA-Z]+")
-_TIME = {"time", "timestamp", "timestamps", "stamp", "t", "measured", "received", "seconds", "sec"}
+_TIME = {"time", "timestamp", "timestamps", "stamp", "t", "measured", "received", "seconds", "sec", "secs"}
+_NANOSECONDS = {"nsec", "nsecs", "nanosec", "nanoseconds"}
 _TIME_ORDER = ("measured", "stamp", "time", "timestamp", "received")
 """Words of a time's name; a device's own time comes before the time of reception."""
 _FRAME = {"frame", "framenumber", "index", "idx", "seq", "sample", "framenum", "number"}
@@ -41,7 +42,8 @@ class ColumnName:
     """The meaning of a column's name."""
 
     kind: str
-    """`time`, `frame`, `body`, `position`, `quaternion`, `angle`, or "" for others."""
+    """`time`, `nanoseconds` (beside seconds, as in ROS), `frame`, `body`, `position`, `quaternion`, `angle`, or
+    "" for others."""
     axis: str = ""
     """`x`, `y`, `z` or `w`; for a time the word that names it."""
     body: str = ""
@@ -77,6 +79,8 @@ def parse_column_name(cells: Sequence[str]) -> ColumnName:
     body = ".".join([*bodies, *([rest] if (rest := _rest(own, found[:-1], context)) else [])])
     if every & _ANGLES and leaf not in _LEAVES:
         return ColumnName("angle", leaf, body)
+    if leaf in _NANOSECONDS:
+        return ColumnName("nanoseconds")
     if leaf in _TIME or (context and context[0] in ("time", "timestamp")):
         word = next((word for word in _TIME_ORDER if word in words), "time")
         return ColumnName("time", word, "", find_unit(unit, TIME_UNITS_S))

@@ -47,6 +47,10 @@ class TableColumns:
     """Column of the number of the sample."""
     body: int | None
     """Column of the name or number of the body in each row."""
+    nanoseconds: int | None = None
+    """Column of nanoseconds that are added to the whole seconds of `time`."""
+    text_time: str = ""
+    """Name of a column of times that are written as text; "" if there is none."""
     time_unit: str = ""
     """Unit that the header states; "" if none."""
     length_unit: str = ""
@@ -161,6 +165,8 @@ def _from_names(
         time,
         frame,
         _first(names, "body") if len(bodies) == 1 else None,
+        None if time is None else _first(names, "nanoseconds", head.text_columns),
+        next((paths[c][-1] for c in sorted(head.text_columns) if names[c].kind == "time"), ""),
         "" if time is None else names[time].unit or _unit_of(units, time, TIME_UNITS_S),
         max(lengths),
         float(rate) if re.fullmatch(r"\d+(\.\d+)?", rate) and float(rate) > 0.0 else None,

@@ -18,6 +18,8 @@ _ROOM, _VEHICLE = 20.0, 200.0
 """Largest coordinate in a room [m], and above which a file in metres is one of a vehicle [choices]."""
 _FASTEST = 20.0
 """Speed that a body, and hardly a vehicle, stays below [m/s] [choice]."""
+_COARSE_STEPS = 0.1
+"""Resolution of times, in median steps, from which on it is told [choice]."""
 _LAG_S = 0.3
 _MOST_PAIRS = 5000
 _LEAST_EXPLAINED, _LEAST_MARGIN = 0.2, 0.15
@@ -49,6 +51,30 @@ def conclude_time_unit(times: Floats, stated: str, given: str | None) -> FileFin
     step_s = step * TIME_UNITS_S[name]
     doubtful = not 1e-3 <= step_s <= 0.4
     return FileFinding("time unit", name, f"the median step of {step:.6g} is then {1e3 * step_s:.4g} ms", doubtful)
+
+
+def conclude_resolution(times: Floats, scale_s: float) -> FileFinding | None:
+    """The decimal to which raw times (N,), in order, were rounded; 1 in them is `scale_s`.
+
+    None where it is fine beside the steps, and where all steps are multiples of the median one, as at an even rate.
+    """
+    steps = np.diff(times)
+    steps = steps[steps > 0.0]
+    if not len(steps):
+        return None
+    median = float(np.median(steps))
+    for digits in range(-9, 7):
+        grid = times * 10.0**digits
+        exact = np.abs(grid - np.round(grid)) <= 1e-3 + 2.0 * np.spacing(np.abs(grid))
+        if 10.0**-digits > 1.5 * steps.min() or not exact.all():
+            continue
+        multiples = np.round(steps / median)
+        even = np.abs(steps - multiples * median) < 0.5 * 10.0**-digits
+        if 10.0**-digits < _COARSE_STEPS * median or even.all():
+            return None
+        value = f"{1e3 * scale_s * 10.0**-digits:g} ms, where the median step is {1e3 * scale_s * median:.4g} ms"
+        return FileFinding("time resolution", value, "all times are multiples of it, and steps differ")
+    return None
 
 
 def conclude_length_unit(

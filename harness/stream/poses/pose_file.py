@@ -20,6 +20,7 @@ from harness.stream.poses.evidence import (
     UNIX_S,
     conclude_length_unit,
     conclude_quaternion_order,
+    conclude_resolution,
     conclude_time_unit,
     counts_samples,
 )
@@ -105,11 +106,13 @@ def _read_file(path: Path, options: PoseFileOptions) -> PoseLog:
         return _read_matrices(head, options)
     columns = find_columns(head, options.columns)
     needed = [c for body in columns.bodies for c in (*body.position, *body.quaternion)]
-    time = columns.time if columns.time is not None else columns.frame
-    table = read_rows(head, [time, *needed] if time is not None else needed, columns.body)
+    clock = [c for c in (columns.time, columns.nanoseconds) if c is not None]
+    clock = clock or [c for c in (columns.frame,) if c is not None]
+    table = read_rows(head, [*clock, *needed], columns.body)
     counted = np.arange(len(table.numbers), dtype=np.float64)
-    times = counted if time is None else table.numbers[:, 0]
-    poses = table.numbers if time is None else table.numbers[:, 1:]
+    times, poses = counted if not clock else table.numbers[:, 0], table.numbers[:, len(clock) :]
+    if len(clock) > 1:
+        times = times + 1e-9 * table.numbers[:, 1]
     findings = [FileFinding("kind", f"rows of numbers, {head.form}", "the file's lines"), *columns.findings]
     if table.left_out:
         findings.append(FileFinding("left out", ", ".join(table.left_out), "they are no rows"))
@@ -214,6 +217,7 @@ def _conclude_clock(
         counted = numbered = True
     if counted:
         what = "no times, but numbers of samples" if numbered else "no times"
+        what += f", but text in the column {columns.text_time!r}" if columns.text_time else ""
         rate_hz = options.rate_hz or columns.rate_hz
         if options.time_unit is not None:
             raise BadInput(f"--time-unit, but {path.name} has {what}.", "Give --rate HZ instead.")
@@ -235,6 +239,8 @@ def _conclude_clock(
         length_s = scale_s * (times[-1] - times[0])
     if not length_s <= _LONGEST_S:
         raise BadFile(path, f"times that span {length_s:.3g} s", EXPECTED_FILE, "Are columns and --time-unit right?")
+    if resolution := conclude_resolution(times, scale_s):
+        findings.append(resolution)
     unix = UNIX_S[0] <= times[0] * scale_s <= UNIX_S[1]
     return scale_s, "Unix time" if unix else "seconds from an unknown start"
 

@@ -15,8 +15,8 @@ from harness.core.fields import replace_fields
 from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
-from harness.measure import Bar, UnitFile, UnitProfile, measure_log_profile, measure_profile
-from harness.measure.reports import Departure, SurveyComparison, UnitReport, compare_with_expected, make_unit_report
+from harness.measure import Bar, SurveyComparison, UnitFile, UnitProfile, measure_log_profile, measure_profile
+from harness.measure.reports import Departure, UnitReport, compare_with_expected, make_unit_report
 from harness.results.files import file_digest
 from harness.simulate import noise_preset
 from harness.stream.recording import EXPECTED_FILE, CaptureReader, PoseRecording

@@ -21,7 +21,7 @@ def read_surveyed_points(path: Path) -> Floats:
         lines = read_input_file(path, _EXPECTED, MEGABYTE).decode("utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
         raise BadFile(path, "bytes that are no text", _EXPECTED, "Is it the right file?") from error
-    rows = []
+    rows: list[list[float]] = []
     for number, line in enumerate(lines, 1):
         words = re.split(r"[,;\s]+", line.strip().strip(",;"))
         if not line.strip() or line.lstrip().startswith("#") or (not rows and not _is_number(words[0])):

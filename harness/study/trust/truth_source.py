@@ -8,7 +8,7 @@ import numpy as np
 from harness.errors import BadFile, BadInput, NotComparable, UnknownName
 from harness.experiment import find_playback
 from harness.experiment.scenarios import Scenario, load_scenario
-from harness.measure import LEAST_OVERLAP_S, TruthSpline, coarse_offset, mean_period_s
+from harness.measure import TruthSpline, coarse_offset
 from harness.mocap import CLIP_FORMATS, LibraryFolders, read_clip
 from harness.stream import PoseLog
 from harness.stream.recording import CaptureReader, RecordingStream, is_pose_file, open_poses
@@ -96,8 +96,7 @@ def _plays_in_loops(capture: CaptureReadings, loops: TruthMotion) -> bool:
         return False
     splines = {station: TruthSpline(loops.bodies[loops.body_of[station]]) for station in poses}
     try:
-        period_s = mean_period_s([one.measured_s for one in poses.values()])
-        found = coarse_offset(poses, splines, period_s, LEAST_OVERLAP_S)
+        found = coarse_offset(poses, splines)
     except NotComparable:
         return False
     return found.correlation >= _LOOPED_CORRELATION

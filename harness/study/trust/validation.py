@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.number_format import Interval
+from harness.core.number_format import Interval, format_fixed
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
 from harness.experiment import Evaluation, evaluate_each, registered_take
@@ -98,7 +98,8 @@ def validate_capture(
     readings, wire = capture.readings, capture.wire
     poses, unseen = _comparable_poses(capture, truth)
     progress("registration", 1, 3)
-    bodies, directions = truth.bodies, ()
+    bodies: Mapping[str, TruthPoses] = truth.bodies
+    directions: tuple[str, ...] = ()
     if wire is None and truth.is_log:
         named = {station: truth.body_of[station] for station in poses}
         poses, bodies, directions = same_directions(poses, truth.bodies, named)
@@ -189,14 +190,16 @@ def _describe_clocks(capture: CaptureReadings, truth: TruthMotion, registration:
     if start_s is None or other_s is None:
         return ()
     offset_s = registration.values["time_offset_orientation_s"].value + start_s - other_s
-    return (f"By their Unix times the capture is {1e3 * offset_s:,.1f} ms late, by orientation.",)
+    return (
+        f"By their Unix times the capture is {format_fixed(1e3 * offset_s, 1, grouped=True)} ms late, by orientation.",
+    )
 
 
 def describe_explained(registration: Registration) -> tuple[str, ...]:
     """A sentence for each station on the share of its motion that the registration explains."""
     return tuple(
-        f"{station}: room, mount, scale and clocks explain {100.0 * place:.2f} % of the variance of the positions and "
-        f"{100.0 * turn:.2f} % of the orientations."
+        f"{station}: room, mount, scale and clocks explain {format_fixed(1e2 * place, 2)} % of the variance of the "
+        f"positions and {format_fixed(1e2 * turn, 2)} % of that of the orientations."
         for station, (place, turn) in registration.explained.items()
     )
 

@@ -124,6 +124,10 @@ SAMPLES: dict[str, str | bytes] = {
             + ",".join(f"field.pose.orientation.{axis}" for axis in "xyzw")
         ],
     ),
+    "seconds and nanoseconds": rows(
+        lambda n: f"1403636579,{round(1e9 * (0.25 + TIMES_S[n]))},{pose(n)}",
+        ["header.stamp.secs,header.stamp.nsecs,position.x,position.y,position.z,quat.w,quat.x,quat.y,quat.z"],
+    ),
     "millimetres": rows(lambda n: f"{TIMES_S[n]:.4f},{pose(n, unit_m=0.001)}", ["t,x,y,z,q0,q1,q2,q3"]),
     "matrices in lines": rows(lambda n: f"{TIMES_S[n]:.4f} {numbers(matrix(n)[:3].ravel(), ' ')}"),
     "matrices column by column": rows(lambda n: f"{TIMES_S[n]:.4f},{numbers(matrix(n).T.ravel())}"),

@@ -7,6 +7,7 @@ from harness.core import rotations
 from harness.stream.poses.evidence import (
     conclude_length_unit,
     conclude_quaternion_order,
+    conclude_resolution,
     conclude_time_unit,
     counts_samples,
     explained_by_lever_arm,
@@ -32,6 +33,22 @@ def test_a_step_that_may_be_two_units_is_an_assumption() -> None:
     assert conclude_time_unit(np.zeros(1), "", None).assumed
     assert conclude_time_unit(SLOW, "s", None).reason == "the column's name"
     assert conclude_time_unit(SLOW, "s", "ms").value == "ms"
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e9])
+@pytest.mark.parametrize("start_s", [0.0, 1.49e9])
+def test_times_that_were_rounded_show_their_resolution(scale: float, start_s: float) -> None:
+    true_s = start_s + np.arange(200) / 30.0
+    found = conclude_resolution(np.round(true_s, 2) * scale, 1.0 / scale)
+    assert found is not None
+    assert found.value == "10 ms, where the median step is 30 ms"
+    assert conclude_resolution(np.round(true_s, 4) * scale, 1.0 / scale) is None
+
+
+def test_even_times_show_no_resolution() -> None:
+    even = np.delete(np.arange(100) / 50.0, [7, 8, 40])  # with gaps
+    assert conclude_resolution(even, 1.0) is None
+    assert conclude_resolution(even[:1], 1.0) is None
 
 
 def test_whole_steps_of_one_are_numbers_of_samples() -> None:

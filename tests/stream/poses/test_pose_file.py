@@ -72,6 +72,13 @@ def test_a_file_without_times_needs_a_rate(name: str, tmp_path: Path) -> None:
     assert untimed.duration_s == COUNT - 1.0
 
 
+def test_times_as_text_are_named(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", rows(lambda n: f"12:30:{n},{pose(n)}", [HEADER]))
+    with pytest.raises(UnknownRate, match=r"a.csv has no times, but text in the column 't'"):
+        read_pose_log(path)
+    assert_motion(read_pose_log(path, PoseFileOptions(rate_hz=RATE_HZ)).bodies[0])
+
+
 def test_unix_times_are_kept(tmp_path: Path) -> None:
     for content, unit in ((tum(), "s"), (euroc(), "ns")):
         log = read_pose_log(write(tmp_path / "a", content))
@@ -250,3 +257,28 @@ def test_a_rate_or_time_unit_that_does_not_fit_is_refused(tmp_path: Path) -> Non
         read_pose_log(write(tmp_path / "b.csv", UNTIMED["kitti"]), PoseFileOptions(time_unit="ms"))
     with pytest.raises(BadFile, match="8 columns, where --columns names 9"):
         read_pose_log(path, PoseFileOptions(columns=tuple("abcdefghi")))
+
+
+def test_header_lines_with_numbers_name_no_bodies(tmp_path: Path) -> None:
+    content = rows(line, ["rate,50,by,hand,room,2,on,Monday", HEADER])
+    assert read_pose_log(write(tmp_path / "a.csv", content)).names == ("a",)
+    named = rows(line, [",head,head,head,head,head,head,head", HEADER])
+    assert read_pose_log(write(tmp_path / "b.csv", named)).names == ("head",)
+
+
+def test_matrices_without_translation_stay_row_by_row(tmp_path: Path) -> None:
+    def turned(n: int) -> str:
+        flat = np.eye(4)
+        flat[:3, :3] = rotations.to_matrix(QUATERNIONS[n])
+        return f"{TIMES_S[n]:.4f},{numbers(flat.ravel())}"
+
+    body = read_pose_log(write(tmp_path / "a.csv", rows(turned))).bodies[0]
+    assert rotations.angle_between_rad(body.quaternions, QUATERNIONS).max() < 1e-6
+
+
+def test_a_column_of_ever_new_words_names_no_bodies(tmp_path: Path) -> None:
+    content = rows(lambda n: f"{TIMES_S[n % COUNT]:.4f},word{n},{pose(n % COUNT)}", [f"t,name,{HEADER[2:]}"], 1001)
+    with pytest.raises(BadFile, match="more than 1000 different words in the column of names"):
+        read_pose_log(write(tmp_path / "a.csv", content))
+    fewer = content.replace("word1000", "word1")
+    assert len(read_pose_log(write(tmp_path / "b.csv", fewer)).bodies) == 1000
