@@ -18,8 +18,8 @@ EXPECTED_COLUMNS = "columns of a time, a position and a quaternion"
 NORM_TOLERANCE = 0.01
 """Largest deviation of a quaternion's norm from 1."""
 _ADVICE = "Name the columns in their order, - for others: --columns time,x,y,z,qx,qy,qz,qw."
-_LABELS = {"id", "parent", "asset id", "type"}
-"""First words of header lines that name neither bodies nor columns; "type" is used to leave markers out."""
+_LABELS = {"id", "parent", "asset id"}
+"""First words of header lines that name neither bodies nor columns."""
 _QUATERNION = ("w", "x", "y", "z")
 _RATES = ("export frame rate", "capture frame rate", "objects", "segments")
 """Names of the rate in the headers of OptiTrack's and Vicon's programs."""
@@ -99,10 +99,9 @@ def _fit(row: Sequence[str], columns: int) -> tuple[str, ...]:
 
 
 def _is_context(row: Sequence[str]) -> bool:
-    """Whether a header line may name bodies or the kind of the columns below."""
+    """Whether a header line may name bodies or the kind of the columns below: nothing stands over the first one."""
     label = next((cell.lower() for cell in row if cell), "")
-    numbers = sum(bool(re.fullmatch(r"[\d.]+", cell)) for cell in row)
-    return bool(label) and label not in _LABELS - {"type"} and not numbers and "format version" not in label
+    return bool(label) and not row[0] and label not in _LABELS
 
 
 def _spread(row: Sequence[str]) -> list[str]:

@@ -276,9 +276,28 @@ def test_matrices_without_translation_stay_row_by_row(tmp_path: Path) -> None:
     assert rotations.angle_between_rad(body.quaternions, QUATERNIONS).max() < 1e-6
 
 
+def test_a_name_that_is_written_in_two_ways_is_one_body(tmp_path: Path) -> None:
+    content = rows(lambda n: f"{TIMES_S[n]:.4f},{('head', ' head')[n % 2]},{pose(n)}", [f"t,name,{HEADER[2:]}"])
+    log = read_pose_log(write(tmp_path / "a.csv", content))
+    assert log.names == ("head",)
+    assert_motion(log.bodies[0])
+
+
 def test_a_column_of_ever_new_words_names_no_bodies(tmp_path: Path) -> None:
     content = rows(lambda n: f"{TIMES_S[n % COUNT]:.4f},word{n},{pose(n % COUNT)}", [f"t,name,{HEADER[2:]}"], 1001)
     with pytest.raises(BadFile, match="more than 1000 different words in the column of names"):
         read_pose_log(write(tmp_path / "a.csv", content))
     fewer = content.replace("word1000", "word1")
     assert len(read_pose_log(write(tmp_path / "b.csv", fewer)).bodies) == 1000
+
+
+def test_the_usual_order_is_that_of_euroc_for_nanoseconds(tmp_path: Path, rng: np.random.Generator) -> None:
+    """A path without a lever arm shows no order."""
+    path = np.cumsum(rng.normal(size=(COUNT, 3)), axis=0) * 0.01
+
+    def content(scale: float) -> str:
+        return rows(lambda n: f"{round(scale * TIMES_S[n])},{numbers([*path[n], *QUATERNIONS[n]])}")
+
+    for scale, usual in ((1e9, "wxyz"), (1e6, "xyzw")):
+        found = finding(read_pose_log(write(tmp_path / "a.csv", content(scale))), "quaternion order")
+        assert (found.value, found.assumed) == (usual, True)
