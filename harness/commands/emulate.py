@@ -34,6 +34,7 @@ from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
     from harness.experiment.scenarios import Scenario
+    from harness.stream import TrackerConfig
     from harness.stream.polhemus import EmulatorConfig, LineEmulator
     from harness.stream.polhemus.codec import DeviceSamples
 
@@ -141,12 +142,13 @@ def _serve_vrpn(
     with ExitStack() as opened:
         with defer_interrupts():
             server = opened.enter_context(open_server(args.vrpn, anywhere=args.anywhere, log=print_status))
-        fastrak, place = isinstance(config, FastrakEmulatorConfig), f"{LOOPBACK}:0"
-        service = serve_fastrak(samples, config, tcp=place) if fastrak else serve_emulator(samples, config, tcp=place)
-        device = opened.enter_context(service)
-        driver = (FastrakConfig if fastrak else DriverConfig)(
-            items=items, stations=samples.stations, characters=config.station_characters(len(samples.stations))
-        )
+        place, characters = f"{LOOPBACK}:0", config.station_characters(len(samples.stations))
+        if isinstance(config, FastrakEmulatorConfig):
+            device = opened.enter_context(serve_fastrak(samples, config, tcp=place))
+            driver: TrackerConfig = FastrakConfig(items=items, stations=samples.stations, characters=characters)
+        else:
+            device = opened.enter_context(serve_emulator(samples, config, tcp=place))
+            driver = DriverConfig(items=items, stations=samples.stations, characters=characters)
         events = EventCounter(lambda text: print_status(f"line: {text}"))
         tracker = opened.enter_context(open_tracker_at(device.name, driver, on_event=events))
         sensors = ", ".join(f"{sensor} {name}" for sensor, name in enumerate(tracker.stations))
