@@ -143,15 +143,13 @@ def _serve_vrpn(
     with ExitStack() as opened:
         with defer_interrupts():
             server = opened.enter_context(open_server(args.vrpn, anywhere=args.anywhere, log=print_status))
-        place, stations = f"{LOOPBACK}:0", samples.stations
-        characters = config.station_characters(len(stations))
-        driver: TrackerConfig
+        place, characters = f"{LOOPBACK}:0", config.station_characters(len(samples.stations))
         if isinstance(config, FastrakEmulatorConfig):
             device = opened.enter_context(serve_fastrak(samples, config, tcp=place))
-            driver = FastrakConfig(items=items, stations=stations, characters=characters)
+            driver: TrackerConfig = FastrakConfig(items=items, stations=samples.stations, characters=characters)
         else:
             device = opened.enter_context(serve_emulator(samples, config, tcp=place))
-            driver = DriverConfig(items=items, stations=stations, characters=characters)
+            driver = DriverConfig(items=items, stations=samples.stations, characters=characters)
         events = EventCounter(lambda text: print_status(f"line: {text}"))
         tracker = opened.enter_context(open_tracker_at(device.name, driver, on_event=events))
         sensors = describe_sensors(tracker.stations)

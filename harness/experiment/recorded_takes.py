@@ -207,6 +207,11 @@ def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: D
     shape = len(frames), len(samples.stations)
     sound = ~np.array([f.suspect for f in frames], bool).reshape(shape)
     stamp_s = np.array([f.measured_s for f in frames]).reshape(shape) - zero_s[:, None]
+    if not np.isfinite(stamp_s).any():
+        raise BadInput(
+            "The records have no time stamps, so that no frame can be found in the clip.",
+            "`harness validate` registers the recording with a reference by its motion.",
+        )
     since = (stamp_s - samples.device_s[0]) * (len(samples) / samples.device_loop_s)
     number = np.round(_row_medians(np.where(sound, since, np.nan)))
     timed = number >= 0.0
