@@ -36,3 +36,13 @@ def mocap() -> Path:
         pytest.skip("no real motion: set HARNESS_MOCAP to a folder with CMU clips")
     assert Path(folder).is_dir(), f"HARNESS_MOCAP={folder} is not a folder"
     return Path(folder)
+
+
+@pytest.fixture(scope="session")
+def real() -> Path:
+    """The folder of real streams of 6-DOF trackers, from HARNESS_REAL."""
+    folder = os.environ.get("HARNESS_REAL")
+    if not folder:
+        pytest.skip("no real streams: set HARNESS_REAL to a folder with hand_eye/ and polhemus/")
+    assert Path(folder).is_dir(), f"HARNESS_REAL={folder} is not a folder"
+    return Path(folder)

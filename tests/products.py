@@ -19,6 +19,7 @@ from harness.bench.physics.error_statistics import LIMIT_M, MERGE_S, SEGMENT_S
 from harness.cli import main
 from harness.errors import Outcome
 from harness.experiment import prepare_playback
+from harness.measure import Bar
 from harness.measure.reports import UnitReport, ValidationReport
 from harness.report.coverage import page as coverage
 from harness.report.coverage.content import CoverageContent
@@ -100,7 +101,7 @@ def rig_capture(made_once: Make) -> Path:
 @pytest.fixture(scope="session")
 def unit_with_faults(rig_capture: Path) -> UnitReport:
     """As `harness characterize --rigid left_hand,torso` finds it."""
-    return characterize_capture(CaptureReader(rig_capture), rigid=("left_hand", "torso")).report
+    return characterize_capture(CaptureReader(rig_capture), bar=Bar(("left_hand", "torso"))).report
 
 
 def _validated(made_once: Make, kind: str) -> ValidationReport:

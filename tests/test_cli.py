@@ -28,7 +28,7 @@ def run(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
 def test_help_names_every_verb_and_each_has_a_file(command: Command) -> None:
     verbs = {line.split()[0] for line in re.findall(r"^  [a-z]+\s.*", command("--help").out, re.MULTILINE)}
     files = (Path(__file__).parents[1] / "harness" / "commands").glob("*.py")
-    assert verbs == {path.stem for path in files if f"\ndef add_{path.stem}(" in path.read_text()}
+    assert verbs == {path.stem for path in files if f"\ndef add_{path.stem}(verbs: Verbs)" in path.read_text()}
     assert {"demo", "run", "list", "inspect", "validate", "status"} < verbs
 
 

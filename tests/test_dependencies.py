@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 PAGE = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
 PACKAGE_OF = {
+    "cv2": "opencv-python-headless",
     "dask": "distributed",  # which is installed with it
     "faiss": "faiss-cpu",
     "imageio_ffmpeg": "imageio-ffmpeg",
@@ -25,7 +26,7 @@ PACKAGE_OF = {
 """Packages of the modules whose names differ."""
 DEVELOPMENT = {"test", "dev", "docs"}
 """Extras of those who change the harness."""
-OTHERS = {"_typeshed", "evo", "pytest"}
+OTHERS = {"_typeshed", "pytest"}
 """Types alone, and packages that `harness.testing` uses where they are installed."""
 OPENS_WITH_AN_EXTRA = {
     "bench/ik.py",

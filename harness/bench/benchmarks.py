@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 
+from harness.bench.foreign.benchmark import bench_foreign
+from harness.bench.foreign.streams import NoRealStreams
 from harness.bench.lab.speed import bench_lab
 from harness.bench.methods import bench_methods
 from harness.bench.neighbour_search import bench_index
@@ -37,12 +39,18 @@ BENCHMARKS: dict[str, Callable[[int, bool, int], list[BenchmarkStatement]]] = {
     "gate": lambda seed, large, runs: bench_regression_gate(seed),
     "sweep": lambda seed, large, runs: bench_sweep(seed),
     "performers": lambda seed, large, runs: bench_performers(seed),
+    "foreign": lambda seed, large, runs: bench_foreign(),
 }
 _REFERENCES = {
-    "index": ("faiss", "The reference for the search of neighbours", "faiss-cpu"),
-    **dict.fromkeys(("ik", "methods"), ("mink", "The reference for inverse kinematics", "mink")),
+    "index": (("faiss", "The reference for the search of neighbours", "faiss-cpu"),),
+    **dict.fromkeys(("ik", "methods"), (("mink", "The reference for inverse kinematics", "mink"),)),
+    "foreign": (
+        ("cv2", "The reference for mounts", "opencv-python-headless"),
+        ("evo", "The reference for spreads", "evo"),
+        ("allantools", "The reference for Allan deviations", "allantools"),
+    ),
 }
-"""Benchmark -> the module of its reference, what it is, and its package."""
+"""Benchmark -> the modules of its references, what each is, and its package."""
 
 ALONE = ("accuracy", "ranking")
 """Benchmarks that run alone, with options of their own."""
@@ -62,8 +70,8 @@ def run_benchmarks(
 
     With `large`, `methods` also uses a database of a million frames, and `wire` runs each line for ten minutes.
     `wire` runs each line `runs` times. UnknownName for an unknown benchmark, BadInput for one of `CHECKOUT_ONLY`,
-    MissingExtra for a named one whose package is not installed, and NoLibrary
-    for a named one that needs real motion.
+    MissingExtra for a named one whose package is not installed, NoLibrary for a named one that needs real motion, and
+    NoRealStreams for one that needs real streams.
     """
     for name in names:
         if name in CHECKOUT_ONLY:
@@ -77,11 +85,11 @@ def run_benchmarks(
     for done, name in enumerate(chosen):
         progress(name, done, len(chosen))
         try:
-            reference = _REFERENCES.get(name)
-            if reference and find_spec(reference[0]) is None:
-                raise MissingExtra(reference[1], reference[2], "bench")
+            for module, what, package in _REFERENCES.get(name, ()):
+                if find_spec(module) is None:
+                    raise MissingExtra(what, package, "bench")
             rows += BENCHMARKS[name](seed, large, runs)
-        except (MissingExtra, NoLibrary) as missing:
+        except (MissingExtra, NoLibrary, NoRealStreams) as missing:
             if names:
                 raise
             skipped.append(f"{name} was not run. {missing}")

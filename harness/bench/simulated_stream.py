@@ -17,7 +17,7 @@ from harness.body import retarget_to_own_body
 from harness.mocap import synthetic
 from harness.results.findings import BenchmarkStatement
 from harness.simulate import Simulation, TrackerConfig, noise_preset, simulate_tracker
-from harness.stream.is900.codec import CaptureStream, Decoder
+from harness.stream.polhemus.codec import CaptureStream, Decoder
 
 MAX_RATIO = 13.0
 """Most CPU time of a frame, relative to MuJoCo's kinematics of one pose: as strict as 20,000 frames/s was."""

@@ -23,7 +23,7 @@ from harness.core.arrays import Bools, Floats
 from harness.core.child_process import PythonProcess, run_python
 from harness.experiment import prepare_playback
 from harness.results.findings import BenchmarkStatement
-from harness.stream.is900.codec import (
+from harness.stream.polhemus.codec import (
     STATION_CHARACTERS,
     Decoder,
     FrameReader,

@@ -43,7 +43,7 @@ def add_bench(verbs: Verbs) -> None:
     text = "measure speed on this machine, or a method's accuracy against stored errors"
     verb = add_verb(verbs, "bench", text, run_bench, "seed", "out", "mocap", "force")
     text = (
-        "methods, ik, index, outliers, wire, stream, physics, lab, gate, sweep, startup, performers "
+        "methods, ik, index, outliers, wire, stream, physics, lab, gate, sweep, startup, performers, foreign "
         "(default: all); accuracy; or ranking: do methods and places rank alike on built-in and real motion?"
     )
     verb.add_argument("what", nargs="*", help=text)

@@ -12,13 +12,13 @@ from harness.commands.flags import (
     Verbs,
     add_line_flags,
     add_verb,
-    line_options,
     output_file,
     output_folder,
     parse_names,
     positive_int,
     refuse_flags_of_others,
     repeat_flags,
+    tracker_config,
 )
 from harness.commands.output import print_result, print_status
 from harness.commands.playback_flags import DEVICE_STATIONS_HELP, default_station_count, parse_device_stations
@@ -135,11 +135,11 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
     from harness.experiment import CalibrationSession, select_stations
     from harness.experiment.scenarios import load_scenario
     from harness.live import PoseTerminal, ViewerOutput
-    from harness.stream.is900 import DriverConfig, open_tracker
+    from harness.stream import open_tracker_at
 
     if args.scenario is None:
         raise BadInput("--port without --scenario.", "Name the scenario with the stations: --scenario NAME.")
-    scenario, asked = load_scenario(args.scenario), parse_device_stations(args.stations)
+    scenario, asked = load_scenario(args.scenario), parse_device_stations(args.stations, args.port)
     stations = tuple(select_stations(scenario, default_station_count(scenario) if asked is None else asked))
     session = CalibrationSession(args.scenario, stations, args.kind or "poses", args.clip, args.mocap)
     with ExitStack() as opened:
@@ -151,9 +151,9 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
             opened.callback(view.close)
             print_status(view.description)
             displays.append(view)
-        config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args, args.port))
+        config = tracker_config(args, args.port, stations)
         device = opened.enter_context(
-            open_tracker(args.port, config, on_event=lambda event: print_status(f"line: {event.text}"))
+            open_tracker_at(args.port, config, on_event=lambda event: print_status(f"line: {event.text}"))
         )
         where = f"{device.identification or 'an IS-900'} at {args.port}"
         print_status(f"{where}; stations {device.station_list}; Ctrl-C ends it")

@@ -1,22 +1,29 @@
 """Flags and arguments that verbs of the command line share, their parsers, and flags that verbs had once."""
 
 import argparse
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from harness.core.network import VRPN_PREFIX
 from harness.core.options import expand_alternatives, split_outside_brackets
 from harness.core.output_place import place_fault
 from harness.errors import BadFile, BadInput, Outcome
 
 if TYPE_CHECKING:
     from harness.experiment.methods import Isolation
+    from harness.stream import TrackerConfig
+    from harness.stream.fastrak import FastrakConfig
+    from harness.stream.is900 import DriverConfig
 
 Verbs = Any  # argparse's subparsers object has no public type
 MOST_PROCESSES = 1024
 """Most worker processes on one computer [choice]."""
 LINE_FLAGS = ("items", "baud", "quality", "keep_settings", "boresight", "alignment")
 """Flags of `add_line_flags`, as attributes of the parsed command line."""
+FASTRAK_PREFIX = "fastrak:"
+"""Beginning of a port at which a FASTRAK is."""
 STATION_CHARACTERS = "123456789ABC"
 """Characters of the stations that a device may have (docs/is900.md 5)."""
 Action = Callable[[argparse.Namespace], Outcome]
@@ -123,6 +130,15 @@ def add_line_flags(
     verb.add_argument("--alignment", type=parse_alignment, metavar="X,Y,Z,X,Y,Z,X,Y,Z", help=text)
 
 
+def add_vrpn_flag(verb: Any, text: str) -> None:
+    """Add `--vrpn NAME`, which serves this text."""
+    verb.add_argument(
+        "--vrpn",
+        metavar="NAME[@HOST:PORT]",
+        help=f"serve VRPN clients as the tracker NAME: {text} (default port 3883 of this computer; 0 takes a free one)",
+    )
+
+
 def refuse_flags(args: argparse.Namespace, names: Iterable[str], where: str, advice: str) -> None:
     """BadInput for the first of these flags (`keep_settings`) that is given; `where` follows its name."""
     for name in names:
@@ -141,13 +157,42 @@ def line_options(args: argparse.Namespace, port: str) -> dict[str, Any]:
     """The driver options that those flags and `--stations head=3` give; BadInput for flags that no such port takes."""
     if args.baud is not None and "://" in port:
         raise BadInput(f"--baud with {port}.", "It is for a serial port: leave it out.")
-    if port.startswith("udp:"):
-        advice = "It needs commands, and UDP carries none: leave it out."
+    if port.startswith(("udp:", VRPN_PREFIX)):
+        advice = f"It needs commands, and {'UDP' if port.startswith('udp:') else 'VRPN'} carries none: leave it out."
         refuse_flags(args, sorted(LINE_FLAGS), f"with {port}", advice)
+    if port.startswith(FASTRAK_PREFIX):
+        advice = "It is for an IS-900: leave it out."
+        refuse_flags(args, sorted({*LINE_FLAGS} - {"items", "baud"}), f"with {port}", advice)
     options = {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
-    if characters := parse_characters(args.stations):
+    if not port.startswith(VRPN_PREFIX) and (characters := parse_characters(args.stations)):
         options["characters"] = characters
     return options
+
+
+def tracker_config(args: argparse.Namespace, port: str, stations: Iterable[str] | None, **more: Any) -> "TrackerConfig":
+    """The settings of the tracker at a port that those flags give; `more` is for the line of an IS-900."""
+    if not port.startswith(VRPN_PREFIX):
+        return line_config(args, port, stations, **more)
+    from harness.stream.vrpn import VrpnConfig
+
+    line_options(args, port)  # refuses the flags of lines
+    mapped = parse_station_map(args.stations, port) if "=" in (args.stations or "") else {}
+    names = None if stations is None else tuple(stations)
+    return VrpnConfig(names, tuple(map(int, mapped.values())) or None, args.rate)
+
+
+def line_config(
+    args: argparse.Namespace, port: str, stations: Iterable[str] | None, **more: Any
+) -> "DriverConfig | FastrakConfig":
+    """The settings of a device on a line that those flags give; `more` is for an IS-900."""
+    names, options = None if stations is None else tuple(stations), line_options(args, port)
+    if port.startswith(FASTRAK_PREFIX):
+        from harness.stream.fastrak import FastrakConfig
+
+        return FastrakConfig(**options, stations=names, rate_hz=args.rate)
+    from harness.stream.is900 import DriverConfig
+
+    return DriverConfig(**{**more, **options}, stations=names, rate_hz=args.rate)
 
 
 def output_folder(text: str) -> Path:
@@ -212,6 +257,28 @@ def positive_float(text: str) -> float:
     return value
 
 
+def share(text: str) -> float:
+    """Read a share above 0, up to 1."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no share above 0, up to 1")
+    return value
+
+
+def parse_pair(text: str) -> tuple[float, float]:
+    """Two numbers of 0 or more, for argparse."""
+    try:
+        first, second = (float(word) for word in text.split(","))
+    except ValueError:
+        first = second = math.nan
+    if not (0.0 <= first < math.inf and 0.0 <= second < math.inf):
+        raise argparse.ArgumentTypeError(f"{text!r} is no pair of numbers, such as 0.2,0.1")
+    return first, second
+
+
 def split_list(text: str | None) -> list[str]:
     """The entries of a list that is separated by commas outside brackets; [] without one; BadInput for an empty one."""
     entries = [entry.strip() for entry in split_outside_brackets(text, ",")] if text else []
@@ -244,9 +311,9 @@ def parse_alignment(text: str) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(values[k : k + 3]) for k in (0, 3, 6))
 
 
-def parse_device_names(text: str) -> list[str]:
-    """Names of stations with or without stations of the device, in the order of the device."""
-    return list(parse_station_map(text)) if "=" in text else parse_names(text)
+def parse_device_names(text: str, port: str = "") -> list[str]:
+    """Names of stations with or without stations of the device at a port, in the order of the device."""
+    return list(parse_station_map(text, port)) if "=" in text else parse_names(text)
 
 
 def parse_characters(text: str | None) -> str:
@@ -254,23 +321,26 @@ def parse_characters(text: str | None) -> str:
     return "".join(parse_station_map(text).values()) if text is not None and "=" in text else ""
 
 
-def parse_station_map(text: str) -> dict[str, str]:
+def parse_station_map(text: str, port: str = "") -> dict[str, str]:
     """Names with the characters of the device's stations, in the order of the device, from `head=3,torso=1`.
 
-    BadInput for a name without a station, a station that no device has, and a name or station that occurs twice.
+    At a port of VRPN these are numbers of sensors. BadInput for a name without a station, a station that no device has,
+    and a name or station that occurs twice.
     """
+    sensors = port.startswith(VRPN_PREFIX)
     pairs = [tuple(part.strip() for part in entry.partition("=")[::2]) for entry in text.split(",")]
-    advice = "Write NAME=STATION for each, such as head=3,torso=1; stations are 1 to 9 and A to C."
+    known = "sensors are whole numbers from 0" if sensors else "stations are 1 to 9 and A to C"
+    advice = f"Write NAME=STATION for each, such as head=3,torso=1; {known}."
     for name, character in pairs:
         if not name or not character:
             raise BadInput(f"--stations {text!r}: {name or character or 'an entry'} has no counterpart.", advice)
-        if len(character) != 1 or character.upper() not in STATION_CHARACTERS:
+        if not (is_whole_number(character) if sensors else character.upper() in set(STATION_CHARACTERS)):
             raise BadInput(f"--stations {text!r}: {character!r} is no station of a device.", advice)
     for what, values in (("name", [name for name, _ in pairs]), ("station", [c.upper() for _, c in pairs])):
         for value in values:
             if values.count(value) > 1:
                 raise BadInput(f"--stations {text!r}: {what} {value} occurs {values.count(value)} times.", advice)
-    return dict(sorted(((name, c.upper()) for name, c in pairs), key=lambda pair: STATION_CHARACTERS.index(pair[1])))
+    return dict(sorted(((name, c.upper()) for name, c in pairs), key=lambda pair: int(pair[1], 16)))
 
 
 def parse_names(text: str) -> list[str]:

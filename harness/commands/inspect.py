@@ -1,28 +1,42 @@
-"""The verb `inspect`: describe a motion file and what is wrong with it, or the coverage of a constellation."""
+"""The verb `inspect`: describe a motion file, poses of another program, or the coverage of a constellation."""
 
 import argparse
 from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, output_file, refuse_flags, repeat_flags
+from harness.commands.flags import (
+    Verbs,
+    add_verb,
+    output_file,
+    refuse_flags,
+    repeat_flags,
+)
 from harness.commands.output import print_result
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags
+from harness.core.units import parse_length_unit
 from harness.errors import Outcome
 
 CONSTELLATION_SUFFIX = ".mcf"
 _OF_CONSTELLATIONS = ("clip", "stations", "out", "force")
+_OF_POSES = tuple(name for name in POSE_FLAGS if name not in ("rate", "unit"))
 
 
 def add_inspect(verbs: Verbs) -> None:
     verb = add_verb(
         verbs,
         "inspect",
-        "describe a motion file and what is wrong with it, or the coverage of a constellation of emitters",
+        "describe a motion file, poses of another program, or the coverage of a constellation of emitters",
         run_inspect,
         "mocap",
     )
-    verb.add_argument("file", type=Path, help="an AMC, BVH, MVNX, C3D or AMASS npz file, or an MCF file of emitters")
+    text = (
+        "an AMC, BVH, MVNX, C3D or AMASS npz file, an MCF file of emitters, a recording of poses, or poses of another "
+        "program (TUM, EuRoC, CSV, matrices), one file or several on one clock"
+    )
+    verb.add_argument("file", type=Path, nargs="+", help=text)
     verb.add_argument("--rate", type=float, metavar="HZ", help="frames per second of a file that records no rate")
-    text = "metres per unit of length of a file that records no unit"
-    verb.add_argument("--unit", metavar="M", type=float, help=text)
+    text = "unit of length of a file that records none: mm, cm, m, in, ft, or metres per unit"
+    verb.add_argument("--unit", metavar="M", type=parse_length_unit, help=text)
+    add_pose_flags(verb, shared=("rate", "unit"))
     emitters = verb.add_argument_group("of an MCF file")
     text = "performer below the emitters: name of a clip, or a motion file; its stations are looked at"
     emitters.add_argument("--clip", metavar="CLIP", help=text)
@@ -35,17 +49,33 @@ def add_inspect(verbs: Verbs) -> None:
 
 
 def run_inspect(args: argparse.Namespace) -> Outcome:
-    if args.file.suffix.lower() == CONSTELLATION_SUFFIX:
+    paths, first = args.file, args.file[0]
+    if len(paths) > 1 or _is_of_poses(first):
+        from harness.commands.inspect_poses import inspect_poses
+
+        refuse_flags(args, (*_OF_CONSTELLATIONS, "mocap"), "with poses", "It is for other files: leave it out.")
+        return inspect_poses(args, paths)
+    args.file = first
+    refuse_flags(args, _OF_POSES, f"with {first.name}", "It is for poses of another program.")
+    if first.suffix.lower() == CONSTELLATION_SUFFIX:
         from harness.commands.inspect_constellation import inspect_constellation
 
         return inspect_constellation(args)
-    refuse_flags(args, _OF_CONSTELLATIONS, f"with {args.file.name}", "It is for an MCF file of emitters.")
+    refuse_flags(args, _OF_CONSTELLATIONS, f"with {first.name}", "It is for an MCF file of emitters.")
     from harness.mocap import folders_of_environment
     from harness.mocap import inspect_file as inspect
 
     library = args.mocap or folders_of_environment() or None
-    found = inspect(args.file, rate_hz=args.rate, unit=args.unit, library=library)
+    found = inspect(first, rate_hz=args.rate, unit=args.unit, library=library)
     # a C3D file has markers only, and `view` takes no unit of length
-    unseen = args.file.suffix.lower() == ".c3d" or args.unit is not None
-    following = [] if unseen else ["view", args.file, *repeat_flags(args, "rate")]
+    unseen = first.suffix.lower() == ".c3d" or args.unit is not None
+    following = [] if unseen else ["view", first, *repeat_flags(args, "rate")]
     return print_result(args, found.as_dict(), *found.lines(), following=following)
+
+
+def _is_of_poses(path: Path) -> bool:
+    """Whether the name of a file is neither that of motion nor that of a constellation."""
+    from harness.mocap import CLIP_FORMATS
+
+    others = (*(f".{kind}" for kind in (*CLIP_FORMATS, "asf")), CONSTELLATION_SUFFIX)
+    return path.suffix.lower() not in others

@@ -13,11 +13,12 @@ from harness.commands.flags import (
     Verbs,
     add_line_flags,
     add_verb,
-    line_options,
+    add_vrpn_flag,
     output_file,
     output_folder,
     positive_float,
     repeat_flags,
+    tracker_config,
 )
 from harness.commands.output import print_caveat, print_result, print_status, show_progress
 from harness.commands.playback_flags import DEVICE_STATIONS_HELP, PlaybackOptions, open_playback, parse_device_stations
@@ -27,8 +28,7 @@ from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 if TYPE_CHECKING:
     from harness.calibrate import CalibrationFile
     from harness.experiment import CalibrationSession, Playback
-    from harness.stream import EventCounter
-    from harness.stream.is900 import DriverConfig, Tracker
+    from harness.stream import EventCounter, OpenTracker, TrackerConfig
     from harness.stream.recording import RecordingSwitch
 
 _CALIBRATION_KINDS = ("exact", "tpose", "poses")
@@ -45,7 +45,8 @@ def add_live(verbs: Verbs) -> None:
     verb.add_argument(
         "--port",
         required=True,
-        help="/dev/ttyUSB0, COM3, the link of an emulated pseudo terminal, tcp://HOST:PORT, udp://HOST:PORT",
+        help="/dev/ttyUSB0, COM3, the link of an emulated pseudo terminal, tcp://HOST:PORT, udp://HOST:PORT, "
+        "vrpn:TRACKER@HOST[:PORT]",
     )
     text = "scenario with the stations, their mounts, the body and the examples (see `harness list`)"
     verb.add_argument("--scenario", required=True, metavar="NAME", help=text)
@@ -70,7 +71,8 @@ def add_live(verbs: Verbs) -> None:
     verb.add_argument("--vmc", metavar="[HOST:]PORT", help=text)
     text = "open the streams NAME-qpos and NAME-joints of the Lab Streaming Layer"
     verb.add_argument("--lsl", metavar="NAME", help=text)
-    verb.add_argument("--anywhere", action="store_true", help="announce the streams of --lsl to other computers too")
+    add_vrpn_flag(verb, "the stations, and of the joints as NAME-joints")
+    verb.add_argument("--anywhere", action="store_true", help="open --lsl and --vrpn to other computers too")
     verb.add_argument("--bvh", type=output_file, metavar="FILE", help="write the motion to a BVH file")
     verb.add_argument("--poses", type=output_file, metavar="FILE", help="write a CSV table of poses and frame times")
     verb.add_argument("--seconds", type=positive_float, metavar="S", help="stop after S seconds")
@@ -98,6 +100,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         OutputOptions,
         SessionControl,
         SessionSetup,
+        VrpnOutput,
         open_outputs,
         run_session,
         warm_up,
@@ -108,6 +111,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     output_options = OutputOptions(
         vmc=args.vmc,
         lsl=args.lsl,
+        vrpn=args.vrpn,
         anywhere=args.anywhere,
         bvh=args.bvh,
         poses=args.poses,
@@ -118,7 +122,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     )
     for path in filter(None, (args.bvh, args.poses)):  # before the performer holds poses
         require_writable(path, "motion", force=args.force)
-    stations = parse_device_stations(args.stations)
+    stations = parse_device_stations(args.stations, args.port)
     playback_options = PlaybackOptions(args.scenario, stations, args.clip, args.rate, args.seed, args.mocap)
     playback = open_playback(playback_options)
     config = _driver_config(args, playback)
@@ -138,6 +142,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         control = SessionControl(RecordingSwitch(note))
         outputs = open_outputs(output_options, setup, control, opened, print_status)
         device = opened.enter_context(_open_device(args.port, config, playback, events, control.recorder))
+        device.pause()  # learning takes a while
         examples = len(playback.clip_evaluation.subject.example_names)
         print_status(f"learning {args.method} from {examples} clips of {playback.scenario.name}")
         with redirect_stdout(sys.stderr):  # a method may print; stdout is for data
@@ -147,8 +152,9 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
                 probe = opened.enter_context(JitterProbe())
             print_status("Ctrl-C ends it")
             options = LiveOptions(setup.rate_hz, args.deadline and 1e-3 * args.deadline, args.seconds)
+            relays = [output.relay(device) for output in outputs if isinstance(output, VrpnOutput)]
             result = run_session(
-                device,
+                relays[0] if relays else device,
                 body,
                 reconstructor,
                 calibration,
@@ -178,31 +184,29 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     return print_result(args, content, *lines, outcome=outcome, following=following)
 
 
-def _driver_config(args: argparse.Namespace, playback: "Playback") -> "DriverConfig":
+def _driver_config(args: argparse.Namespace, playback: "Playback") -> "TrackerConfig":
     """How the tracker is set up for the stations and the motion of a playback."""
-    from harness.stream.is900 import DriverConfig
-    from harness.stream.is900.codec import position_range_m
+    from harness.stream.polhemus.codec import position_range_m
 
-    options = {"items": playback.tracker.items, **line_options(args, args.port)}
-    reach_m = playback.reach_m if position_range_m(options["items"]) else None  # it takes a simulation
-    stations = tuple(playback.scenario.stations)
-    return DriverConfig(**options, stations=stations, rate_hz=args.rate, reach_m=reach_m)
+    items = args.items or playback.tracker.items
+    reach_m = playback.reach_m if position_range_m(items) else None  # it takes a simulation
+    return tracker_config(args, args.port, playback.scenario.stations, items=items, reach_m=reach_m)
 
 
 @contextmanager
 def _open_device(
     port: str,
-    config: "DriverConfig",
+    config: "TrackerConfig",
     playback: "Playback",
     events: "EventCounter",
     recorder: "RecordingSwitch | None" = None,
-) -> "Iterator[Tracker]":
+) -> "Iterator[OpenTracker]":
     """Open and set up the tracker; BadInput when its rate is not the scenario's."""
-    from harness.stream.is900 import open_tracker
+    from harness.stream import open_tracker_at
 
     rate_hz = playback.tracker.rate_hz
-    with open_tracker(port, config, observer=recorder, on_event=events) as device:
-        runs_hz = device.wire.rate_hz
+    with open_tracker_at(port, config, observer=recorder, on_event=events) as device:
+        runs_hz = device.rate_hz
         if abs(runs_hz - rate_hz) > _RATE_TOLERANCE * rate_hz:
             raise BadInput(
                 f"The device sends {runs_hz:.1f} frames per second, {playback.scenario.name} has {rate_hz:g}.",
@@ -237,7 +241,7 @@ def _guided_calibrations(args: argparse.Namespace, playback: "Playback") -> "dic
 
 
 def _calibrate_performer(
-    port: str, config: "DriverConfig", playback: "Playback", events: "EventCounter", session: "CalibrationSession"
+    port: str, config: "TrackerConfig", playback: "Playback", events: "EventCounter", session: "CalibrationSession"
 ) -> "CalibrationFile":
     """Calibrate by held poses before methods learn, so that they learn on the performer's bone lengths.
 

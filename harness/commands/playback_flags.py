@@ -64,11 +64,11 @@ def default_station_count(scenario: "Scenario") -> int:
     return min(DEFAULT_STATION_COUNT, len(scenario.worn_stations))
 
 
-def parse_device_stations(text: str | None) -> int | list[str] | None:
-    """A number of stations, or their names, from `--stations`; None without it, BadInput for an empty name.
+def parse_device_stations(text: str | None, port: str = "") -> int | list[str] | None:
+    """A number of stations at a port, or their names, from `--stations`; None without it, BadInput for an empty name.
 
     The names may have stations of the device (`head=3`); they are then in the order of the device.
     """
     if text is None:
         return None
-    return int(text) if is_whole_number(text) else parse_device_names(text)
+    return int(text) if is_whole_number(text) else parse_device_names(text, port)

@@ -1,4 +1,4 @@
-"""The verb `record`: record a device's line, or a simulated one."""
+"""The verb `record`: record a device's line, a simulated one, or poses of another program."""
 
 import argparse
 import math
@@ -12,30 +12,39 @@ from harness.commands.flags import (
     add_line_flags,
     add_verb,
     is_whole_number,
-    line_options,
+    line_config,
     output_link,
     parse_device_names,
     parse_names,
     refuse_flags,
+    tracker_config,
 )
 from harness.commands.output import print_result, print_status, recording_note, show_progress
 from harness.commands.playback_flags import PlaybackOptions, open_playback
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
+from harness.core.network import VRPN_PREFIX
 from harness.core.package_data import VERSION
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
     from harness.stream.recording import RecordingWriter
 
+_POSE_FLAGS = tuple(name for name in POSE_FLAGS if name != "rate")
 SIMULATION_PREFIX = "sim:"
 """Prefix of a scenario's name in place of a port: the simulated line is recorded."""
 
 
 def add_record(verbs: Verbs) -> None:
-    text = "record both directions of a device's line until Ctrl-C; appends to a recording in the same file"
-    verb = add_verb(verbs, "record", text, run_record, "seed", "mocap")
-    verb.add_argument(
-        "port", help="/dev/ttyUSB0, COM3, tcp://HOST:PORT, udp://HOST:PORT, or sim:SCENARIO for a simulated line"
+    text = (
+        "record both directions of a device's line until Ctrl-C, appending to a recording in the same file; or keep "
+        "poses of another program as a recording"
     )
+    verb = add_verb(verbs, "record", text, run_record, "seed", "mocap")
+    text = (
+        "/dev/ttyUSB0, COM3, tcp://HOST:PORT, udp://HOST:PORT, vrpn:TRACKER@HOST[:PORT], sim:SCENARIO for a simulated "
+        "line, or files of poses (TUM, EuRoC, CSV, matrices, C3D)"
+    )
+    verb.add_argument("port", nargs="+", help=text)
     verb.add_argument("file", type=Path, help="the recording to write")
     text = (
         "names of the device's active stations, in order, or names with stations of the device (head=3,torso=1); "
@@ -62,9 +71,17 @@ def add_record(verbs: Verbs) -> None:
     verb.add_argument("--poses", action="store_true", default=None, help=text)
     text = "plan of a trust study that the recording is made for: its digest is written into it"
     verb.add_argument("--plan", type=Path, metavar="PLAN.toml", help=text)
+    add_pose_flags(verb, shared=("rate",))
+    text = "files of poses: the stretch NAME begins at S seconds after the first pose; may be repeated"
+    verb.add_argument("--mark", action="append", metavar="NAME=S", help=text)
 
 
 def run_record(args: argparse.Namespace) -> Outcome:
+    paths = [Path(port) for port in args.port]
+    if len(paths) > 1 or holds_poses(paths[0]):
+        return _record_poses(args, paths)
+    args.port = args.port[0]
+    refuse_flags(args, (*_POSE_FLAGS, "mark"), f"with {args.port}", "It is for files of poses: leave it out.")
     with recording_note(args.file):
         return _record(args)
 
@@ -87,7 +104,7 @@ def _record(args: argparse.Namespace) -> Outcome:
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     from harness.mocap.synthetic import stretch_marks
-    from harness.stream.is900 import add_byte_faults, unapplied_kinds
+    from harness.stream.polhemus import add_byte_faults, unapplied_kinds
     from harness.stream.recording import RecordingWriter, record_capture
 
     plan = _plan_note(args)
@@ -122,6 +139,49 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     return _print_recording(args, written)
 
 
+def _record_poses(args: argparse.Namespace, paths: Sequence[Path]) -> Outcome:
+    """Keep poses of another program in the recording format, whole or not at all."""
+    from harness.stream.recording import write_pose_recording
+
+    lines = (
+        *(name for name in LINE_FLAGS),
+        "seconds",
+        "send",
+        "allow_writes",
+        "serve",
+        "clip",
+        "noise",
+        "poses",
+        "seed",
+    )
+    refuse_flags(args, lines, "with a file of poses", "It is for a line: leave it out.")
+    found = read_poses(paths, pose_options(args))
+    log = found.log if args.stations is None else found.log.select(parse_names(args.stations))
+    marks = found.marks if args.mark is None else _parse_marks(args.mark, log.duration_s)
+    note = {**found.note, "source": "poses", "file": log.source, "harness": VERSION, **_plan_note(args)}
+    write_pose_recording(args.file, log, note, marks)
+    poses = sum(len(body.times_s) for body in log.bodies)
+    content = {"file": str(args.file), "poses": poses, "bodies": log.names, "marks": len(marks)}
+    content |= {"findings": [str(finding) for finding in log.findings]}
+    text = f"{args.file}: {poses:,} poses of {', '.join(log.names)} in {log.duration_s:.2f} s"
+    return print_result(args, content, *map(str, log.findings), text, following=["inspect", args.file])
+
+
+def _parse_marks(texts: Sequence[str], duration_s: float) -> list[tuple[float, str]]:
+    """The times [s] and names of `--mark NAME=S`, in the order of time. Raises BadInput."""
+    marks = []
+    for text in texts:
+        name, equals, at = text.rpartition("=")
+        try:
+            at_s = float(at) if equals else math.nan
+        except ValueError:
+            at_s = math.nan
+        if not 0.0 <= at_s <= duration_s:
+            raise BadInput(f"--mark {text!r}.", f"Write NAME=S with S from 0 to {duration_s:.2f}, as static=0.")
+        marks.append((at_s, name.strip()))
+    return sorted(marks)
+
+
 def _plan_note(args: argparse.Namespace) -> dict[str, str]:
     """The entry of a recording's note that names the plan it was made for; none without a plan."""
     if args.plan is None:
@@ -134,11 +194,11 @@ def _plan_note(args: argparse.Namespace) -> dict[str, str]:
 
 def _record_line(args: argparse.Namespace) -> Outcome:
     """Record a device that is set up here, that another program uses, or that is sent commands."""
-    from harness.stream.is900 import DriverConfig
     from harness.stream.recording import (
         RecordingWriter,
         check_commands,
         format_exchanges,
+        open_writer,
         record_commands,
         record_port,
         serve_line,
@@ -151,23 +211,29 @@ def _record_line(args: argparse.Namespace) -> Outcome:
     if args.send is not None:
         advice = "--send sets nothing but what it names: leave it out."
         refuse_flags(args, ("stations", *settings), "with --send", advice)
-    if args.port.startswith("udp:"):
-        advice = "UDP carries no commands: name the serial line."
+    if args.port.startswith(("udp:", VRPN_PREFIX)):
+        advice = f"{'UDP' if args.port.startswith('udp:') else 'VRPN'} carries no commands: name the serial line."
         refuse_flags(args, ("serve", "send"), f"with {args.port}", advice)
     if args.send is not None:
         check_commands(args.send, args.allow_writes)
-    stations = None if args.stations is None else tuple(parse_device_names(args.stations))
-    config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args, args.port))
+    stations = None if args.stations is None else parse_device_names(args.stations, args.port)
     source = "served" if args.serve is not None else "port" if args.send is None else "commands"
     note = {"source": source, "port": args.port, "harness": VERSION, **_plan_note(args)}
     options: dict[str, Any] = {"seconds": args.seconds, "log": print_status, "progress": show_progress}
+    if args.port.startswith(VRPN_PREFIX):
+        tracker = tracker_config(args, args.port, stations)
+        with open_writer(args.file, note, tracker) as writer:
+            line = record_port(args.port, tracker, writer, **options)
+        return _print_poses(args, writer, line)
     with RecordingWriter(args.file, note) as writer:
         if args.serve is not None:
+            config = line_config(args, args.port, stations)
             counts = serve_line(args.port, args.serve, config, writer, **options)
         elif args.send is not None:
+            config = line_config(args, args.port, stations)
             exchanges = record_commands(args.port, args.send, config, writer, **options)
         else:
-            line = record_port(args.port, config, writer, **options)
+            line = record_port(args.port, line_config(args, args.port, stations), writer, **options)
     if args.serve is not None:
         unread, lost = counts["unread"], counts["undelivered"]
         text = [f"{unread} bytes were not read by a program"] if unread else []
@@ -176,6 +242,23 @@ def _record_line(args: argparse.Namespace) -> Outcome:
     if args.send is not None:
         return _print_recording(args, writer, more={"exchanges": exchanges}, lines=format_exchanges(exchanges))
     return _print_recording(args, writer, line)
+
+
+def _print_poses(args: argparse.Namespace, writer: "RecordingWriter", line: Mapping[str, int]) -> Outcome:
+    """Print what was recorded of a tracker that reports poses; `line` are the counts of its client."""
+    poses, outcome = writer.counts["pose"], Outcome.PASS
+    line = {**line, "left_out": writer.counts["left_out"]}
+    content = {"file": str(args.file), "poses": poses, "events": writer.counts["evnt"], **line}
+    text = f"{args.file}: {poses:,} poses"
+    if writer.empty:
+        text = f"{args.file}: stopped before a pose was recorded into it"
+        outcome = Outcome.INTERRUPTED if line.get("interrupted") else Outcome.NOT_COMPARABLE
+    counted = {"reconnects": "reconnects", "copies": "redundant reports", "clock_resets": "resets of its clock"}
+    counted["lost"] = "messages lost by UDP"
+    counted["left_out"] = "poses left out that were not later than the one before"
+    text += "".join(f", {line[name]} {words}" for name, words in counted.items() if line.get(name))
+    following = ["inspect", args.file] if args.file.exists() else []
+    return print_result(args, content, text, outcome=outcome, following=following)
 
 
 def _print_recording(

@@ -1,30 +1,54 @@
-"""The verb `replay`: play a recording into the decoder, and into methods."""
+"""The verb `replay`: play a recording or poses as frames, and a recording into methods."""
 
 import argparse
 import json
 import sys
 from collections.abc import Sequence
-from contextlib import redirect_stdout
+from contextlib import ExitStack, redirect_stdout, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.flags import Verbs, add_verb, parse_methods, parse_names, repeat_flags
+from harness.commands.flags import (
+    Verbs,
+    add_verb,
+    add_vrpn_flag,
+    parse_methods,
+    parse_names,
+    refuse_flags,
+    repeat_flags,
+)
 from harness.commands.output import print_caveat, print_data, print_result, print_status
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
+from harness.core.interrupts import defer_interrupts
 from harness.core.number_format import format_fixed
 from harness.core.progress import ProgressBar
-from harness.errors import Outcome
+from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
     from harness.experiment import Evaluation, ObservedTake
-    from harness.stream.recording import Recording, RecordingStream
+    from harness.stream import StreamSummary
+    from harness.stream.recording import PoseLogStream, Recording, RecordingStream, ReplaySpeed
+
+_SCORING = ("methods", "scenario", "stations", "clip", "noise", "seed", "calibration")
+"""Flags that ask for methods; with a recording --rate too."""
+_POSE_FLAGS = tuple(name for name in POSE_FLAGS if name != "rate")
+
+_POLL_S = 0.2
+"""Interval at which the wait for a client can be interrupted [s]."""
 
 
 def add_replay(verbs: Verbs) -> None:
-    text = "play a recording into the decoder; with --methods, into methods, scored against the known motion"
+    text = "play a recording into the decoder, or poses; with --methods, into methods, scored against the known motion"
     verb = add_verb(verbs, "replay", text, run_replay, "seed", "mocap")
-    verb.add_argument("file", type=Path, help="recording written by `harness record`")
-    text = "max (default), step (one frame per Enter), or a factor of the recorded speed, such as 1 or 0.5"
-    verb.add_argument("--speed", default="max", metavar="SPEED", help=text)
+    text = "recording written by `harness record`, or poses of another program (TUM, EuRoC, CSV, matrices)"
+    verb.add_argument("file", type=Path, help=text)
+    text = (
+        "max (default), step (one frame per Enter), or a factor of the recorded speed, such as 1 (default with --vrpn) "
+        "or 0.5"
+    )
+    verb.add_argument("--speed", metavar="SPEED", help=text)
+    add_vrpn_flag(verb, "the recorded stations, from the first client on")
+    verb.add_argument("--anywhere", action="store_true", help="open --vrpn to other computers too")
     text = "print every station of every frame, as CSV or as JSON lines"
     verb.add_argument("--frames", action="store_true", help=text)
     text = "methods to score, named as in scenarios, such as ik,dynamic_map"
@@ -39,21 +63,54 @@ def add_replay(verbs: Verbs) -> None:
     verb.add_argument("--rate", type=float, metavar="HZ", help=text)
     text = "calibration of mounts, room and body for the methods, written by `harness calibrate` (default: the truth)"
     verb.add_argument("--calibration", type=Path, metavar="FILE", help=text)
+    add_pose_flags(verb, shared=("rate",))
 
 
 def run_replay(args: argparse.Namespace) -> Outcome:
     from harness.stream.recording import RecordingStream, parse_speed, read_recording
 
-    speed, recording = parse_speed(args.speed), read_recording(args.file)
+    speed = parse_speed(args.speed or ("1" if args.vrpn else "max"))
+    if args.anywhere and args.vrpn is None:
+        raise BadInput("--anywhere without --vrpn.", "Name the tracker that is served: --vrpn NAME.")
+    if args.vrpn is not None:
+        refuse_flags(args, ("frames", *_SCORING), "with --vrpn", "It is for a replay that is not served: leave it out.")
+    if holds_poses(args.file):
+        return _replay_poses(args, speed)
+    refuse_flags(args, _POSE_FLAGS, f"with {args.file.name}", "It is for poses of another program: leave it out.")
+    recording = read_recording(args.file)
     if recording.answers and not recording.formats:
         return _print_answers(args, recording)
     stream = RecordingStream(recording, speed)
     for lost in stream.recording.damage:
         print(f"lost: {lost}", file=sys.stderr)
-    scoring = ("methods", "scenario", "stations", "clip", "noise", "rate", "seed", "calibration")
-    if any(getattr(args, name) is not None for name in scoring):
+    if args.vrpn is not None:
+        return _serve_frames(args, stream)
+    if any(getattr(args, name) is not None for name in (*_SCORING, "rate")):
         return _score_methods(args, stream)
     return _print_frames(args, stream)
+
+
+def _serve_frames(args: argparse.Namespace, stream: "RecordingStream | PoseLogStream") -> Outcome:
+    """Serve the frames to VRPN clients, from the first client on."""
+    from harness.stream import UnixTimeEstimator
+    from harness.stream.vrpn import RelayedStream, describe_sensors, open_server
+
+    frames = 0
+    with ExitStack() as opened:
+        with defer_interrupts():
+            server = opened.enter_context(open_server(args.vrpn, anywhere=args.anywhere, log=print_status))
+        sensors = describe_sensors(stream.stations)
+        print_status(f"VRPN: {server.names[0]} with the sensors {sensors}; waits for a client, Ctrl-C ends it")
+        outcome = Outcome.INTERRUPTED
+        with suppress(KeyboardInterrupt):
+            while not server.wait_for_client(_POLL_S):
+                pass
+            times = UnixTimeEstimator(stream.wall_s)
+            for _ in RelayedStream(stream, server, server.trackers[0], times):
+                frames += 1
+            outcome = Outcome.PASS
+    counts = {"frames": frames, "reports": server.sent}
+    return print_result(args, counts, f"{frames} frames, {server.sent} reports served", outcome=outcome)
 
 
 def _print_answers(args: argparse.Namespace, recording: "Recording") -> Outcome:
@@ -64,9 +121,32 @@ def _print_answers(args: argparse.Namespace, recording: "Recording") -> Outcome:
     return print_result(args, content, *format_exchanges(recording.answers))
 
 
-def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
+def _replay_poses(args: argparse.Namespace, speed: "ReplaySpeed") -> Outcome:
+    """Play poses of another program: frames alone, because nothing tells the body that carried them."""
+    from harness.stream.recording import PoseLogStream
+
+    advice = "Poses of another program name no performer, mounts or motion: leave it out."
+    refuse_flags(args, _SCORING, f"with the poses of {args.file.name}", advice)
+    found = read_poses([args.file], pose_options(args))
+    for lost in found.damage:
+        print(f"lost: {lost}", file=sys.stderr)
+    stream = PoseLogStream(found.log, speed)
+    if args.vrpn is not None:
+        return _serve_frames(args, stream)
+    if (summary := _play(args, stream)) is None:
+        return Outcome.PASS
+    findings = [str(finding) for finding in found.log.findings]
+    content = {**summary.as_dict(), "lost": list(found.damage), "findings": findings}
+    if args.frames and not args.json:  # the frames are the data
+        print(summary, file=sys.stderr)
+        return Outcome.PASS
+    following = ["inspect", args.file, *repeat_flags(args, *POSE_FLAGS)]
+    return print_result(args, content, str(summary), "", *findings, following=following)
+
+
+def _play(args: argparse.Namespace, stream: "RecordingStream | PoseLogStream") -> "StreamSummary | None":
+    """Play a stream, and print its frames with --frames; None when the reader of stdout has left."""
     from harness.stream import FRAME_COLUMNS, StreamSummary, format_csv_row, frame_rows
-    from harness.stream.recording import format_exchanges
 
     summary = StreamSummary(stream.stations)
     if args.frames and not args.json:
@@ -77,7 +157,15 @@ def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcom
             rows = frame_rows(frame, stream.stations, stream.wall_s(frame.received_s))
             texts = [json.dumps(row) if args.json else format_csv_row(row) for row in rows]
             if not print_data("".join(f"{text}\n" for text in texts)):
-                return Outcome.PASS
+                return None
+    return summary
+
+
+def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
+    from harness.stream.recording import format_exchanges
+
+    if (summary := _play(args, stream)) is None:
+        return Outcome.PASS
     recording = stream.recording
     content = {**summary.as_dict(), **stream.counts, "lost": recording.damage, "events": recording.events}
     content |= {"answers": recording.answers}

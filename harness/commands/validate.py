@@ -1,10 +1,12 @@
 """The verb `validate`: compare a capture with a reference that was recorded beside it."""
 
 import argparse
+import math
 from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, split_list
+from harness.commands.flags import Verbs, add_verb, parse_pair, refuse_flags, share, split_list
 from harness.commands.output import print_result, this_command
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
 from harness.commands.unit_results import UnitOptions, add_unit_flags, departure_content, read_expected, write_unit
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
@@ -13,10 +15,11 @@ from harness.errors import BadInput, Outcome
 def add_validate(verbs: Verbs) -> None:
     text = "register a capture with a reference, and measure errors, clocks, room and mounts against it"
     verb = add_verb(verbs, "validate", text, run_validate, "mocap")
-    verb.add_argument("capture", type=Path, help="a recording by `harness record` or `harness characterize`")
+    verb.add_argument("capture", type=Path, help="a recording, or a file of poses of another program")
     text = (
         "the reference: a clip of the capture's scenario or of a library, another capture, a C3D file with three or "
-        "more markers a station (head_1, head_2, head_3), a TUM file or folder with NAME.tum, or a CSV table"
+        "more markers a station (head_1, head_2, head_3), a TUM file or folder with NAME.tum, or a CSV table; beside a "
+        "file of poses also any other one"
     )
     verb.add_argument("--truth", required=True, metavar="CLIP|FILE", help=text)
     verb.add_argument(
@@ -25,6 +28,12 @@ def add_validate(verbs: Verbs) -> None:
     verb.add_argument(
         "--methods", metavar="A,B", help="clip: methods to reconstruct and score with what was registered"
     )
+    verb.add_argument("--stations", metavar="A,B", help="compare these stations only (default: all)")
+    text = "smallest share of the records that must have a reference (default 0.95)"
+    verb.add_argument("--least-matched", type=share, default=0.95, metavar="SHARE", help=text)
+    text = "standard deviations of the reference's positions and orientations on each axis, which enter the intervals"
+    verb.add_argument("--truth-noise", type=parse_pair, metavar="MM,DEG", help=text)
+    add_pose_flags(verb)
     text = "unit file to write: that of --expect, or the preset, with what the reference showed; the page is beside it"
     add_unit_flags(verb, text)
 
@@ -34,22 +43,32 @@ def run_validate(args: argparse.Namespace) -> Outcome:
     from harness.report.lab.validation_page import validation_page
     from harness.stream.recording import CaptureReader
     from harness.study.trust.capture_readings import read_capture
+    from harness.study.trust.logged_poses import readings_of_poses
     from harness.study.trust.truth_source import TruthSource, load_truth
-    from harness.study.trust.validation import evaluate_registered, session_unit, validate_capture
+    from harness.study.trust.validation import ValidationOptions, evaluate_registered, session_unit, validate_capture
 
     options = UnitOptions(args.out, args.expect, args.force)
     source = TruthSource(args.truth, args.scenario, args.mocap)
     methods = split_list(args.methods)
     expected = read_expected(options)
-    reader = CaptureReader(args.capture)
     with ProgressBar("steps") as progress:
         progress("reading", 0, 3)
-        capture = read_capture(reader)
+        if holds_poses(args.capture):
+            capture = readings_of_poses(read_poses([args.capture], pose_options(args)))
+        else:
+            refuse_flags(
+                args, POSE_FLAGS, f"with {args.capture.name}", "It is for poses of another program: leave it out."
+            )
+            capture = read_capture(CaptureReader(args.capture))
+        if args.stations:
+            capture = capture.only(split_list(args.stations))
         truth = load_truth(capture, source)
         if methods and truth.playback is None:
             advice = "Only a clip has a performer's body to score on: leave it out."
             raise BadInput(f"--methods with {truth.title}.", advice)
-        found = validate_capture(capture, truth, expected=expected, progress=progress)
+        noise = None if args.truth_noise is None else (1e-3 * args.truth_noise[0], math.radians(args.truth_noise[1]))
+        limits = ValidationOptions(args.least_matched, noise)
+        found = validate_capture(capture, truth, expected=expected, options=limits, progress=progress)
         scores = evaluate_registered(found, methods, progress) if methods else []
     report = found.report
     errors = {one.method: {metric: one.metrics[metric] for metric in one.names} for one in scores}
@@ -59,6 +78,10 @@ def run_validate(args: argparse.Namespace) -> Outcome:
         "truth": truth.title,
         "matched_share": report.matched_share,
         "numbers": {key: number.as_dict() for key, number in report.numbers.items()},
+        "explained": {
+            station: {"position": place, "orientation": turn}
+            for station, (place, turn) in found.registration.explained.items()
+        },
         "exchanged": dict(found.exchanged),
         "departures": departure_content(found.named, "p_holm"),
         "scores": [

@@ -7,14 +7,23 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.commands.flags import Verbs, add_verb, output_file, parse_methods, positive_float
+from harness.commands.flags import (
+    Verbs,
+    add_verb,
+    output_file,
+    parse_methods,
+    positive_float,
+    refuse_flags,
+)
 from harness.commands.output import print_result, print_status
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 
 if TYPE_CHECKING:
     from harness.view import ViewedMotion
 
+_POSE_FLAGS = tuple(name for name in POSE_FLAGS if name != "rate")
 _MOST_SAVED_S = 60.0
 """Longest movie that the page may ask for [s]; `--save` has no such limit."""
 
@@ -22,14 +31,16 @@ _MOST_SAVED_S = 60.0
 def add_view(verbs: Verbs) -> None:
     text = "show a clip, a run or a recording in 3-D in the browser; save movies and pages"
     verb = add_verb(verbs, "view", text, run_view, "seed", "mocap", "force")
-    text = "name of a clip, motion file (AMC, BVH, MVNX, AMASS npz), folder of a run, or recording"
+    text = "name of a clip, motion file (AMC, BVH, MVNX, AMASS npz), folder of a run, recording, or file of poses"
     verb.add_argument("what", metavar="CLIP|RUN|RECORDING", help=text)
     text = "methods to show, in this order (default: all of a run, none of a recording)"
     verb.add_argument("--methods", metavar="A,B", help=text)
     verb.add_argument("--clip", metavar="NAME", help="clip of a run to begin with, or clip that was recorded")
     text = "scenario that was played, if the recording does not name it"
     verb.add_argument("--scenario", metavar="NAME", help=text)
-    verb.add_argument("--rate", type=positive_float, metavar="HZ", help="frames per second of an AMC file")
+    verb.add_argument(
+        "--rate", type=positive_float, metavar="HZ", help="frames per second of an AMC file or of matrices"
+    )
     text = "write a movie of the clip, with up to three methods side by side, instead of opening a browser"
     verb.add_argument("--save", type=output_file, metavar="FILE.mp4|FILE.gif", help=text)
     verb.add_argument("--from", type=float, dest="start", default=0.0, metavar="S", help="start of the movie")
@@ -38,6 +49,7 @@ def add_view(verbs: Verbs) -> None:
     text = "write one page that holds all of it, instead of opening a browser"
     verb.add_argument("--out", type=output_file, metavar="FILE.html", help=text)
     verb.add_argument("--no-browser", action="store_true", help="print the address alone")
+    add_pose_flags(verb, shared=("rate",))
 
 
 def run_view(args: argparse.Namespace) -> Outcome:
@@ -66,12 +78,22 @@ def run_view(args: argparse.Namespace) -> Outcome:
 
 
 def _open(args: argparse.Namespace) -> "ViewedMotion":
-    from harness.commands.viewed_motion import open_motion
+    from harness.commands.viewed_motion import open_motion, view_poses
 
     methods = None if args.methods is None else parse_methods(args.methods)
+    if holds_poses(Path(args.what)):
+        advice = "Poses of another program name no performer, mounts or motion: leave it out."
+        refuse_flags(args, ("methods", "scenario", "clip", "seed", "mocap"), f"with the poses of {args.what}", advice)
+        return view_poses(read_poses([Path(args.what)], pose_options(args)))
+    refuse_flags(args, _POSE_FLAGS, f"with {args.what}", "It is for poses of another program: leave it out.")
     of_run = Path(args.what).is_dir()
     playback = {"scenario": args.scenario, "clip": None if of_run else args.clip, "seed": args.seed}
-    options = {"methods": methods, "mocap": args.mocap, "rate_hz": args.rate, "playback": playback}
+    options = {
+        "methods": methods,
+        "mocap": args.mocap,
+        "rate_hz": args.rate,
+        "playback": playback,
+    }
     with ProgressBar("steps") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
         motion = open_motion(args.what, **options, progress=bar)
     return motion.beginning_with(args.clip) if of_run and args.clip is not None else motion

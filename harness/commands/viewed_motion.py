@@ -28,6 +28,7 @@ from harness.view import ViewedMotion
 
 if TYPE_CHECKING:
     from harness.stream import TrackerFrame
+    from harness.stream.recording import PoseRecording
 
 _SEED = 1
 """Seed of built-in motion that is named by its take, as in the shipped scenarios."""
@@ -190,6 +191,20 @@ def _view_recording(
     return ViewedMotion(
         title, standard_skeleton(), [path.name], lambda _: clip, " ".join(lost), [one.method for one in evaluations]
     )
+
+
+def view_poses(found: "PoseRecording") -> ViewedMotion:
+    """The bodies of poses of another program in their own world; the note tells what was assumed about them."""
+    from harness.stream.recording import PoseLogStream
+
+    path = found.path
+    stream = PoseLogStream(found.log)
+    frames = tuple(stream)
+    stations = _stations(stream.stations, frames, np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3))
+    clip = PlayerClip(path.name, path.name, _times_s(frames), 0.0, None, (), stations)
+    assumed = [f"{finding}." for finding in found.log.findings if finding.assumed]
+    note = " ".join(["The world is that of the file.", *assumed, *(f"Lost: {text}." for text in found.damage)])
+    return ViewedMotion(path.name, standard_skeleton(), [path.name], lambda _: clip, note)
 
 
 def _require_frames(path: Path, count: int) -> None:

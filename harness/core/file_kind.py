@@ -9,6 +9,7 @@ from harness.core import parsing
 from harness.core.input_file import MEGABYTE
 from harness.errors import BadFile
 
+POSES_KIND = "a recording of poses"
 _READERS = {
     "a scenario": "`harness run` runs it.",
     "a sweep": "`harness sweep` runs it.",
@@ -17,6 +18,7 @@ _READERS = {
     "a calibration": "`harness live --calibration` and `harness replay --calibration` read it.",
     "a unit file": "`harness characterize --expect` and scenarios read it.",
     "a recording": "`harness replay` and `harness view` read it.",
+    POSES_KIND: "`harness inspect`, `replay` and `view` read it.",
     "a BVH motion": "`harness inspect` and `harness view` read it.",
     "a list of emitters": "`harness inspect` reads it as NAME.mcf.",
     "a file of results": "Name the folder that holds it.",
@@ -34,6 +36,7 @@ _KINDS = {
 """Value of the key `kind` -> what the TOML file is."""
 _KEYS = {"scenarios": "a sweep", "motion": "a scenario"}
 _PATTERNS = (
+    (rb"\A\x89IS900\r\n\x02\x00", POSES_KIND),
     (rb"\A\x89IS900\r\n", "a recording"),
     (rb"\A\s*HIERARCHY\s", "a BVH motion"),
     (rb"\ASQLite format 3\x00", "a file of results"),

@@ -1,7 +1,14 @@
-"""Host names to addresses: IPv4 first, since devices and receivers of UDP listen there."""
+"""Addresses of hosts: IPv4 first, since devices and receivers of UDP listen there; loopback unless asked."""
 
 import socket
 from typing import Any
+
+from harness.errors import BadInput
+
+LOOPBACK = "127.0.0.1"
+VRPN_PREFIX = "vrpn:"
+"""Beginning of a port that is a tracker of a VRPN server."""
+_LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 
 def resolve_host(host: str, port: int, kind: socket.SocketKind) -> list[tuple[socket.AddressFamily, Any]]:
@@ -12,3 +19,18 @@ def resolve_host(host: str, port: int, kind: socket.SocketKind) -> list[tuple[so
     """
     found = [(family, address) for family, _, _, _, address in socket.getaddrinfo(host, port, type=kind)]
     return sorted(found, key=lambda one: one[0] != socket.AF_INET)
+
+
+def parse_address(text: str, default_host: str = "") -> tuple[str, int]:
+    """Split `HOST:PORT`, or `PORT` where there is a default host. Raises BadInput."""
+    host, _, number = text.rpartition(":")
+    host = host or default_host
+    if not host or not (number.isascii() and number.isdecimal() and len(number) <= 5) or int(number) > 65535:
+        raise BadInput(f"{text!r} is no HOST:PORT.", "An example is 127.0.0.1:5005.")
+    return host.strip("[]"), int(number)
+
+
+def check_loopback(host: str, anywhere: bool, risk: str) -> None:
+    """Raise BadInput for an address outside this computer, unless `anywhere`. `risk` says what others could do."""
+    if host not in _LOOPBACK and not anywhere:
+        raise BadInput(f"{host} is reachable from other computers.", f"Use 127.0.0.1, or --anywhere: {risk}.")

@@ -29,7 +29,7 @@ from harness.experiment.tasks import ClipTask, PlannedCell
 from harness.reconstruct import Method
 from harness.results import Cell, as_row, cell_folder, has_cell, read_row, source_hash, write_cell
 from harness.score import COVERAGE_FLOOR, score_estimate
-from harness.stream.is900.codec import record_size
+from harness.stream.polhemus.codec import record_size
 
 _ANSWERS = ("angle_sigma_rad", "status", "origin", "step_ms", "step_cpu_ms", "reference_cpu_ms")
 _READINGS = {"quality": float, "position_valid": bool, "orientation_valid": bool, "suspect": bool}

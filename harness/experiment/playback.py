@@ -24,7 +24,7 @@ from harness.experiment.scenarios.scenario_reader import load_scenario
 from harness.experiment.simulated_calibration import PerformerCalibration
 from harness.mocap import LibraryFolders
 from harness.simulate import Simulation, TrackerConfig, simulate_loop
-from harness.stream.is900.codec import DeviceSamples
+from harness.stream.polhemus.codec import DeviceSamples
 
 
 class Playback:

@@ -26,7 +26,7 @@ from harness.mocap import LibraryFolders
 from harness.score import WARM_UP_S, LoopFrames
 from harness.simulate import sampling_times_s
 from harness.stream import TrackerFrame
-from harness.stream.is900.codec import STATION_CHARACTERS, DeviceSamples
+from harness.stream.polhemus.codec import STATION_CHARACTERS, DeviceSamples
 from harness.stream.recording import EXPECTED_FILE, RecordingStream
 
 RATE_TOLERANCE = 0.02
@@ -207,6 +207,11 @@ def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: D
     shape = len(frames), len(samples.stations)
     sound = ~np.array([f.suspect for f in frames], bool).reshape(shape)
     stamp_s = np.array([f.measured_s for f in frames]).reshape(shape) - zero_s[:, None]
+    if not np.isfinite(stamp_s).any():
+        raise BadInput(
+            "The records have no time stamps, so that no frame can be found in the clip.",
+            "`harness validate` registers the recording with a reference by its motion.",
+        )
     since = (stamp_s - samples.device_s[0]) * (len(samples) / samples.device_loop_s)
     number = np.round(_row_medians(np.where(sound, since, np.nan)))
     timed = number >= 0.0

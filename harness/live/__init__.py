@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from harness.live.stated_uncertainty import describe_uncertainty
     from harness.live.viewer import ViewerOutput
     from harness.live.vmc import VmcOutput
+    from harness.live.vrpn_output import VrpnOutput
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
@@ -28,6 +29,7 @@ __all__ = [
     "SessionSetup",
     "ViewerOutput",
     "VmcOutput",
+    "VrpnOutput",
     "describe_uncertainty",
     "draw_poses",
     "open_outputs",

@@ -15,6 +15,7 @@ from harness.live.pose import Output, SessionSetup
 from harness.live.session_control import SessionControl
 from harness.live.viewer import ViewerOutput
 from harness.live.vmc import VmcOutput
+from harness.live.vrpn_output import VrpnOutput
 
 
 @dataclass(frozen=True)
@@ -25,8 +26,10 @@ class OutputOptions:
     """[HOST:]PORT that receives the VMC protocol."""
     lsl: str | None = None
     """Name of the streams of the Lab Streaming Layer."""
+    vrpn: str | None = None
+    """NAME[@[HOST:]PORT] of trackers that are served by VRPN."""
     anywhere: bool = False
-    """Whether those streams are announced to other computers too."""
+    """Whether those streams and trackers are open to other computers too."""
     bvh: Path | None = None
     poses: Path | None = None
     """Table of poses and frame times."""
@@ -43,8 +46,8 @@ class OutputOptions:
             raise BadInput("--out without --view frames or browser.", "Give both, or neither.")
         if self.no_browser and self.view != "browser":
             raise BadInput("--no-browser without --view browser.", "Give both, or neither.")
-        if self.anywhere and self.lsl is None:
-            raise BadInput("--anywhere without --lsl.", "Name the streams with --lsl.")
+        if self.anywhere and self.lsl is None and self.vrpn is None:
+            raise BadInput("--anywhere without --lsl or --vrpn.", "Name the streams with --lsl or --vrpn.")
 
 
 def open_outputs(
@@ -78,6 +81,8 @@ def _requested_outputs(
         yield VmcOutput(options.vmc, setup.skeleton)
     if options.lsl is not None:
         yield LslOutput(options.lsl, setup.skeleton, setup.rate_hz, network=options.anywhere)
+    if options.vrpn is not None:
+        yield VrpnOutput(options.vrpn, setup, anywhere=options.anywhere, say=say)
     if options.bvh is not None:
         yield BvhOutput(options.bvh, setup.skeleton, setup.rate_hz, force=options.force)
     if options.poses is not None:

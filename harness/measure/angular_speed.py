@@ -9,15 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Bools, Floats, Ints, freeze
+from harness.core.arrays import Floats, Ints, freeze
 from harness.core.motion import count_steps
 from harness.errors import BadInput, NotComparable
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
+from harness.measure.sampling import mean_period_s
 
 LEAST_GAIN = 0.1
 """Least gain in the mean correlation of the stations concerned with which an exchange is believed [choice]."""
+SPAN_S = 0.2
+"""Time over which angular speeds are means [s]: over single steps, noise and rounded times hide them [choice]."""
 _FEWEST_STEPS = 20
-_LEAST_OVERLAP_S = 10.0
+LEAST_OVERLAP_S = 10.0
+"""Shortest common motion of capture and reference [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,24 +51,19 @@ class TimeOffset:
     """Time for which both have angular speeds at this offset [s]."""
 
 
-def angular_speed(time_s: Floats, quaternions: Floats, valid: Bools, period_s: float) -> SpeedSeries:
-    """Angular speed between consecutive poses (N, 4), which are put on a grid of `period_s` [s].
+def angular_speed(poses: TruthSpline, period_s: float, span_s: float = SPAN_S) -> SpeedSeries:
+    """Mean angular speed over `span_s` around each place of a grid of `period_s` [s]; NaN where a gap is in the span.
 
-    Of several poses at one place of the grid the last counts. BadInput without a valid pose.
+    The poses need no even rate: they are resampled by their spline.
     """
-    rows = np.flatnonzero(valid & np.isfinite(time_s))
-    if not len(rows):
-        raise BadInput("No pose has a time.", "Send time stamps with the records.")
-    begin_s = float(time_s[rows].min())
-    count_steps(float(time_s[rows].max()) - begin_s, period_s, "Times of poses")
-    place = np.round((time_s[rows] - begin_s) / period_s).astype(np.int64)
-    turn, at_s = np.full((place.max() + 1, 4), np.nan), np.full(place.max() + 1, np.nan)
-    turn[place], at_s[place] = quaternions[rows], time_s[rows]
-    step_s = np.diff(at_s)
-    angle = np.full(len(step_s), np.nan)
-    known = np.isfinite(step_s) & (step_s > 0.0)
-    angle[known] = rotations.angle_between_rad(turn[:-1][known], turn[1:][known]) / step_s[known]
-    return SpeedSeries(begin_s + 0.5 * period_s, period_s, angle)
+    count_steps(float(poses.time_s[-1] - poses.time_s[0]), period_s, "Times of poses")
+    grid_s = np.arange(poses.time_s[0], poses.time_s[-1], period_s)
+    turn, covered = poses.poses(grid_s)[1], poses.covers(grid_s)
+    steps = max(round(span_s / period_s), 1)
+    known = np.append(0, np.cumsum(covered))
+    whole = known[steps + 1 :] - known[: -steps - 1] == steps + 1
+    speed = rotations.angle_between_rad(turn[:-steps], turn[steps:]) / (steps * period_s)
+    return SpeedSeries(grid_s[0] + 0.5 * steps * period_s, period_s, np.where(whole, speed, np.nan))
 
 
 def time_offset(
@@ -99,7 +98,8 @@ def time_offset(
         )
     # Short overlaps correlate by chance: the lower end of Fisher's interval ranks the lags.
     correlation = np.where(enough, total[0] / np.maximum(total[1], 1e-300), -1.0)
-    score = np.arctanh(np.clip(correlation, -0.999999, 0.999999)) - 3.0 / np.sqrt(np.maximum(total[2] - 3.0, 1.0))
+    independent = total[2] * min(period_s / SPAN_S, 1.0)
+    score = np.arctanh(np.clip(correlation, -0.999999, 0.999999)) - 3.0 / np.sqrt(np.maximum(independent - 3.0, 1.0))
     best = int(np.argmax(np.where(enough, score, -np.inf)))
     shift = best - (length_b - 1) + _parabola(correlation, best)
     offset_s = origin_a - origin_b + shift * period_s
@@ -137,26 +137,16 @@ def _parabola(values: Floats, best: int) -> float:
     return float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
 
 
-def record_period_s(stations: Mapping[str, MeasuredPoses]) -> float:
-    """Median time between records of a station [s]."""
-    steps_s = [np.diff(np.unique(s.measured_s[np.isfinite(s.measured_s)])) for s in stations.values()]
-    return float(np.median(np.concatenate(steps_s)))
-
-
 def coarse_offset(
-    stations: Mapping[str, MeasuredPoses], splines: Mapping[str, TruthSpline], period_s: float, least_overlap_s: float
+    stations: Mapping[str, MeasuredPoses],
+    splines: Mapping[str, TruthSpline],
+    least_overlap_s: float = LEAST_OVERLAP_S,
 ) -> TimeOffset:
     """Offset of the device's clock from that of the reference, from the angular speeds of all stations."""
-    measured = [angular_speed(s.measured_s, s.tracker_from_station, s.valid, period_s) for s in stations.values()]
-    expected = [reference_speed(splines[name], period_s) for name in stations]
+    period_s = mean_period_s([station.measured_s for station in stations.values()])
+    measured = [angular_speed(station.orientations(), period_s) for station in stations.values()]
+    expected = [angular_speed(splines[name], period_s) for name in stations]
     return time_offset(measured, expected, least_overlap_s=least_overlap_s)
-
-
-def reference_speed(spline: TruthSpline, period_s: float) -> SpeedSeries:
-    """Angular speed of a reference, over steps of `period_s` as the device's."""
-    count_steps(float(spline.time_s[-1] - spline.time_s[0]), period_s, "Times of the reference")
-    grid_s = np.arange(spline.time_s[0], spline.time_s[-1], period_s)
-    return angular_speed(grid_s, spline.poses(grid_s)[1], spline.covers(grid_s), period_s)
 
 
 def identify_stations(
@@ -172,11 +162,10 @@ def identify_stations(
     if len(names) < 2 or len(bodies) < len(names):
         return dict(stated)
     splines = {body: TruthSpline(truths[body]) for body in bodies}
-    period_s = record_period_s(stations)
 
     def correlations(worn: Mapping[str, str]) -> Floats:
         on = {name: splines[body] for name, body in worn.items()}
-        offset_s = coarse_offset({name: stations[name] for name in worn}, on, period_s, _LEAST_OVERLAP_S).offset_s
+        offset_s = coarse_offset({name: stations[name] for name in worn}, on).offset_s
         return np.array([_correlations(stations[name], splines, offset_s) for name in names])
 
     rows, own = np.arange(len(names)), [bodies.index(stated[name]) for name in names]

@@ -17,10 +17,14 @@ MOST_TURN_RAD = math.radians(15.0)
 """Largest median error of orientations with which a registration is believed [choice]."""
 MOST_PLACE_M = 0.05
 """Largest median error of a station's positions with which a registration is believed [m] [choice]."""
+MOST_PLACE_SHARE = 0.15
+"""Largest such error relative to the extent of the motion: drifting odometry errs more on a longer way [choice]."""
 MOST_HEADING_RAD = math.radians(30.0)
 """Largest heading error that counts as one of a tracker [rad] [choice]."""
 MOST_CLOCK_ERROR = 500e-6
 """Largest relative error of a clock's rate that counts as one of a device; quartz errs by less than 200e-6 [choice]."""
+MOST_PLAIN_CLOCK_ERROR = 0.01
+"""Largest relative error between two sources of unknown clocks; a larger one is a wrong rate [choice]."""
 UNITS_M = {
     "micrometres": 1e-6, "millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "decimetres": 0.1, "feet": 0.3048,
     "kilometres": 1e3,
@@ -87,35 +91,40 @@ def require_orientations(residual_rad: Sequence[Floats]) -> None:
         )
 
 
-def require_positions(residual_m: Mapping[str, Floats], factor: float, heading_rad: float) -> None:
+def require_positions(
+    residual_m: Mapping[str, Floats], factor: float, heading_rad: float, extent_m: float = 0.0
+) -> None:
     """Raise BadInput if positions do not follow the reference; `residual_m` holds errors (N, 3) by station.
 
-    `factor` is the ratio of reported lengths to those of the reference, `heading_rad` the heading error.
+    `factor` is the ratio of reported lengths to those of the reference, `heading_rad` the heading error, `extent_m` the
+    RMS distance of the reference's positions from their mean.
     """
+    most_m = max(MOST_PLACE_M, MOST_PLACE_SHARE * extent_m) * max(1.0, abs(factor))
     size_m = {name: float(np.median(np.linalg.norm(rest, axis=1))) for name, rest in residual_m.items() if len(rest)}
-    far = [name for name, middle_m in size_m.items() if not middle_m <= MOST_PLACE_M * max(1.0, abs(factor))]
-    most_m = max(size_m.values(), default=0.0)
+    far = [name for name, middle_m in size_m.items() if not middle_m <= most_m]
+    found_m = max(size_m.values(), default=0.0)
     if far and len(far) < len(size_m):
         raise BadInput(
-            f"Positions of {', '.join(far)} disagree with the reference by {most_m:.2g} m in the middle; those of the "
+            f"Positions of {', '.join(far)} disagree with the reference by {found_m:.2g} m in the middle; those of the "
             "other stations agree.",
             "Likely cause: bodies of the reference are in different units, of different times, or exchanged.",
         )
     if far or not abs(heading_rad) <= MOST_HEADING_RAD:
         raise BadInput(
-            f"Positions of the reference disagree with its orientations, by {most_m:.2g} m in the middle "
+            f"Positions of the reference disagree with its orientations, by {found_m:.2g} m in the middle "
             f"and a heading of {math.degrees(heading_rad):.0f} deg.",
             "Likely cause: positions or quaternions were converted to other axes or a left-handed frame and the others "
             "were not, one axis has another scale, or they are of different times.",
         )
 
 
-def require_clock(ratio: float, deviation: float) -> None:
+def require_clock(ratio: float, deviation: float, most: float = MOST_CLOCK_ERROR) -> None:
     """Raise BadInput if the device's clock is faster or slower than the reference's by more than a clock errs.
 
-    `ratio` is the relative error of its rate, `deviation` the standard deviation of that.
+    `ratio` is the relative error of its rate, `deviation` the standard deviation of that, `most` the
+    largest one that counts as a clock's.
     """
-    if abs(ratio) - 2.0 * deviation > MOST_CLOCK_ERROR:
+    if abs(ratio) - 2.0 * deviation > most:
         raise BadInput(
             f"The clock of the capture runs {1.0 + ratio:.5f} times as fast as that of the reference.",
             "Likely cause: the frame rate of the reference is another one than its file says (29.97 Hz is not 30 Hz), "

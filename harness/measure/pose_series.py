@@ -37,6 +37,15 @@ class MeasuredPoses:
         freeze(self, position_m=(count, 3), tracker_from_station=(count, 4))
         freeze(self, np.bool_, valid=(count,))
 
+    def orientations(self) -> "TruthSpline":
+        """Orientations over time, of the valid records whose stamps rise; BadInput with fewer than four of them."""
+        rows = np.flatnonzero(self.valid & np.isfinite(self.measured_s))
+        rows = rows[self.measured_s[rows] > np.maximum.accumulate(np.append(-np.inf, self.measured_s[rows]))[:-1]]
+        if len(rows) < 4:
+            raise BadInput("No pose has a time.", "Send time stamps with the records.")
+        turn = self.tracker_from_station[rows]
+        return TruthSpline(TruthPoses(self.measured_s[rows], np.zeros((len(rows), 3)), turn))
+
 
 @dataclass(frozen=True, eq=False)
 class TruthPoses:

@@ -16,13 +16,14 @@ from harness.core.arrays import Bools, Floats
 from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadFile, BadInput
-from harness.measure.episode_fit import EpisodeFit, find_disturbances, fit_episodes
-from harness.measure.gauss_markov import ErrorProcess
+from harness.measure.episode_fit import EXCURSION_RATE, EpisodeFit, find_disturbances, fit_episodes
+from harness.measure.gauss_markov import NOISE_KEYS, ErrorProcess
 from harness.measure.noise_fit import NoiseFit, fit_noise, start_values
 from harness.measure.rigid_pair import RigidPair, measure_rigid_pair
 from harness.measure.static_series import StaticSeries, find_rest, static_series
+from harness.measure.surveyed_points import RestPlace
 from harness.measure.timing import TimingAccumulator, TimingMeasurement
-from harness.stream.recording import CaptureBlock, CaptureReader, StationReadings
+from harness.stream.recording import CaptureReader, StationReadings
 
 STATIC_CORRELATIONS = 10.0
 """Least length of a rest, in correlation times of the drift."""
@@ -30,6 +31,8 @@ REST_STRETCHES = ("", "static")
 """Stretches in which rates of errors are measured; a station that is covered on purpose is left out."""
 MOST_REST_SAMPLES = 1_300_000
 """Samples at rest that are analysed: 30 minutes of six stations at 120 Hz. It bounds the memory."""
+_COVERED = "covered"
+"""Stretch in which stations are covered by a hand."""
 QUALITY_EDGES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Edges of the classes of quality."""
 _CAPTURE = "a capture with stations at rest"
@@ -43,6 +46,15 @@ class StretchLength:
     """Name of its mark; "" without one."""
     duration_s: float
     records: int
+
+
+@dataclass(frozen=True)
+class Bar:
+    """Two stations on one rigid bar."""
+
+    stations: tuple[str, str]
+    stated_m: tuple[float, float] | None = None
+    """Length that somebody measured, and its standard uncertainty [m]; None where nobody did."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +89,8 @@ class UnitProfile:
     episodes: EpisodeFit
     quality: tuple[QualityClass, ...]
     rigid: RigidPair | None
+    places: tuple[RestPlace, ...]
+    """Where stations rested, in the order in which it was found."""
     limits: tuple[str, ...]
     """What this capture cannot show, a sentence each."""
 
@@ -84,6 +98,11 @@ class UnitProfile:
     def rest(self) -> tuple[StaticSeries, ...]:
         """The stations at rest that were analysed."""
         return tuple(one.series for one in self.episodes.found)
+
+    @property
+    def even_rate_hz(self) -> float:
+        """Rate of the readings at rest [Hz]: the nominal one, or that to which an uneven source was resampled."""
+        return self.rest[0].rate_hz if self.rest else self.rate_hz
 
     @property
     def parameters(self) -> dict[str, Interval]:
@@ -100,26 +119,33 @@ class UnitProfile:
 def measure_profile(
     reader: CaptureReader,
     *,
-    rigid: tuple[str, str] | None = None,
+    bar: Bar | None = None,
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> UnitProfile:
     """Measure a unit from a capture.
 
-    BadFile for a capture without a rest of at least ten correlation times. BadInput for a station of `rigid` that is
-    not in it.
+    BadFile for a capture without a rest of at least ten correlation times, unless it has a moving bar. BadInput for a
+    station of `bar` that is not in it.
     """
-    _check_pair(rigid, reader.wire.stations)
-    collected = _Collected(reader, rigid)
+    require_pair(bar, reader.wire.stations)
+    collected, timing, garbage_bytes = (
+        CollectedReadings(reader.wire.rate_hz, bar),
+        TimingAccumulator(reader.wire.rate_hz),
+        0,
+    )
     for number, block in enumerate(reader.blocks()):
         progress("reading", number, number + 1)
-        collected.add(block)
-    if not collected.rest:
+        timing.add(block)
+        garbage_bytes += block.garbage_bytes
+        collected.add(block.stretch, block.stations)
+    if not collected.rest and bar is None:
         advice = "Let all stations lie still for a minute or more, in sight of the emitters."
         raise BadFile(reader.path, "no stretch in which a station rests", _CAPTURE, advice)
-    progress("finding episodes", 0, 3)
-    noise, episodes = _fit(collected.rest, progress)
+    noise, episodes = (
+        fit_rest(collected.rest, progress) if collected.rest else without_rest("No station rests for 5 s.")
+    )
     correlation = noise.all_stations["components.drift.correlation_s"]
-    longest_s = max(one.duration_s for one in collected.rest)
+    longest_s = max((one.duration_s for one in collected.rest), default=0.0)
     if correlation.is_measured and longest_s < STATIC_CORRELATIONS * correlation.value:
         found = f"a rest of {longest_s:.3g} s, with errors that are correlated over {correlation.value:.3g} s"
         expected = f"a rest of {STATIC_CORRELATIONS * correlation.value:.3g} s or more"
@@ -131,59 +157,77 @@ def measure_profile(
         reader.note,
         collected.stretches(),
         tuple(reader.damage),
-        collected.garbage_bytes,
-        collected.timing.measure(),
+        garbage_bytes,
+        timing.measure(),
         noise,
         episodes,
         _quality_errors(collected.rest + collected.covered),
         collected.rigid_pair(),
+        tuple(collected.places),
         collected.limits(),
     )
 
 
-def _check_pair(rigid: tuple[str, str] | None, stations: tuple[str, ...]) -> None:
-    for name in rigid or ():
+def require_pair(bar: Bar | None, stations: tuple[str, ...]) -> None:
+    """Raise BadInput unless a bar has two of the stations."""
+    names = bar.stations if bar else ()
+    for name in names:
         if name not in stations:
             raise BadInput(f"No station {name!r} in the capture.", f"It has {', '.join(stations)}.")
-    if rigid and rigid[0] == rigid[1]:
-        raise BadInput(f"--rigid names {rigid[0]} twice.", "Name the two stations on the bar.")
+    if names and names[0] == names[1]:
+        raise BadInput(f"--rigid names {names[0]} twice.", "Name the two stations on the bar.")
 
 
-class _Collected:
-    """What is kept of the blocks of a capture while it is read."""
+def without_rest(reason: str) -> tuple[NoiseFit, EpisodeFit]:
+    """Noise and episodes that were not measured, and why."""
+    missing = Interval.missing(reason)
+    return NoiseFit(dict.fromkeys(NOISE_KEYS, missing), {}), EpisodeFit({EXCURSION_RATE: missing}, {}, {}, ())
 
-    def __init__(self, reader: CaptureReader, rigid: tuple[str, str] | None) -> None:
-        self._rate_hz, self._rigid = reader.wire.rate_hz, rigid
-        self.timing = TimingAccumulator(self._rate_hz)
+
+class CollectedReadings:
+    """What is kept of the readings of a capture while they come: stations at rest, and a moving bar."""
+
+    def __init__(self, rate_hz: float, bar: Bar | None) -> None:
+        self._rate_hz, self._bar = rate_hz, bar
         self.rest: list[StaticSeries] = []
         self.covered: list[StaticSeries] = []
-        self.garbage_bytes = 0
+        self.places: list[RestPlace] = []
         self._samples = 0
         self._left_out_s = 0.0
         self._moved = 0
         self._stretches: dict[str, list[float]] = {}
         self._motion: list[tuple[StationReadings, StationReadings]] = []
 
-    def add(self, block: CaptureBlock) -> None:
-        self.timing.add(block)
-        self.garbage_bytes += block.garbage_bytes
-        length = self._stretches.setdefault(block.stretch, [0.0, 0.0])
-        times_s = [readings.received_s for readings in block.stations.values() if len(readings)]
+    def add(self, stretch: str, stations: Mapping[str, StationReadings]) -> None:
+        """Add readings of a stretch of this name, whose records come at the rate."""
+        length, records = self._stretches.setdefault(stretch, [0.0, 0.0]), sum(map(len, stations.values()))
+        times_s = [readings.received_s for readings in stations.values() if len(readings)]
         if times_s:
             length[0] += max(float(t[-1]) for t in times_s) - min(float(t[0]) for t in times_s)
-        length[1] += block.records
-        if not block.stations:
+        length[1] += records
+        if not stations:
             return
-        kept = self.rest if block.stretch in REST_STRETCHES else self.covered if block.stretch == "covered" else None
-        for station, readings in block.stations.items():
-            for rest in find_rest(readings, self._rate_hz).tolist() if kept is not None else ():
-                self._keep(kept, static_series(readings, (rest[0], rest[1]), self._rate_hz, station))
-        if self._rigid and block.stretch not in ("static", "covered") and self._moved < MOST_REST_SAMPLES:
-            self._moved += block.records
-            self._motion.append((block.stations[self._rigid[0]], block.stations[self._rigid[1]]))
+        for station, readings in stations.items() if stretch in (*REST_STRETCHES, _COVERED) else ():
+            self.add_rest(station, readings, self._rate_hz, stretch)
+        if self._bar and stretch not in ("static", _COVERED) and self._moved < MOST_REST_SAMPLES:
+            self._moved += records
+            self.add_motion(stations)
 
-    def _keep(self, kept: list[StaticSeries] | None, series: StaticSeries) -> None:
-        if kept is None or series.valid.sum() < 2.0 * self._rate_hz:
+    def add_rest(self, station: str, readings: StationReadings, rate_hz: float, stretch: str = "") -> None:
+        """Keep the rests of a station whose records come at an even rate."""
+        for rest in find_rest(readings, rate_hz).tolist():
+            kept = self.covered if stretch == _COVERED else self.rest
+            self._keep(kept, static_series(readings, (rest[0], rest[1]), rate_hz, station))
+            self.places.append(_rest_place(station, readings, slice(rest[0], rest[1])))
+
+    def add_motion(self, stations: Mapping[str, StationReadings]) -> None:
+        """Keep the two stations on a bar; their records need no even rate."""
+        if self._bar:
+            first, second = self._bar.stations
+            self._motion.append((stations[first], stations[second]))
+
+    def _keep(self, kept: list[StaticSeries], series: StaticSeries) -> None:
+        if series.valid.sum() < 2.0 * series.rate_hz:
             return
         if self._samples + len(series) > MOST_REST_SAMPLES:
             self._left_out_s += series.duration_s
@@ -195,7 +239,7 @@ class _Collected:
         return tuple(StretchLength(name, one[0], int(one[1])) for name, one in self._stretches.items())
 
     def rigid_pair(self) -> RigidPair | None:
-        if self._rigid is None:
+        if self._bar is None:
             return None
         columns = []
         for number in (0, 1):
@@ -210,7 +254,13 @@ class _Collected:
                 sound &= np.diff(time_s, prepend=-np.inf) > 0.0
             columns.append((time_s[sound], place[sound], turn[sound]))
         first, second = columns
-        return measure_rigid_pair(self._rigid, (first[0], second[0]), (first[1], second[1]), (first[2], second[2]))
+        return measure_rigid_pair(
+            self._bar.stations,
+            (first[0], second[0]),
+            (first[1], second[1]),
+            (first[2], second[2]),
+            self._bar.stated_m,
+        )
 
     def limits(self) -> tuple[str, ...]:
         if not self._left_out_s:
@@ -221,8 +271,15 @@ class _Collected:
         )
 
 
-def _fit(rest: list[StaticSeries], progress: ProgressCallback) -> tuple[NoiseFit, EpisodeFit]:
-    """Noise and episodes, in turn: each is found better once the other is known."""
+def _rest_place(station: str, readings: StationReadings, rows: slice) -> RestPlace:
+    place_m = readings.position_m[rows][np.isfinite(readings.position_m[rows, 0])]
+    begin_s = float(readings.received_s[rows][0])
+    return RestPlace(station, begin_s, np.median(place_m, axis=0), np.std(place_m, axis=0), len(place_m))
+
+
+def fit_rest(rest: list[StaticSeries], progress: ProgressCallback) -> tuple[NoiseFit, EpisodeFit]:
+    """Noise and episodes of stations at rest, in turn: each is found better once the other is known."""
+    progress("finding episodes", 0, 3)
     nothing: list[Bools] = [np.zeros(len(one), bool) for one in rest]
     start = np.exp(start_values(rest, nothing))
     found, _ = find_disturbances(rest, ErrorProcess(float(start[0]), float(start[1]), float(start[5])))
@@ -247,6 +304,8 @@ def _excursion_noise(noise: NoiseFit, start: Floats) -> ErrorProcess:
 
 def _quality_errors(series: list[StaticSeries]) -> tuple[QualityClass, ...]:
     """Distance from the resting place, by classes of quality; the first class holds the lost readings."""
+    if not series:
+        return ()
     quality = np.concatenate([one.quality for one in series])
     away_m = np.concatenate([np.linalg.norm(one.position_m, axis=1) for one in series])
     came = np.isfinite(quality)

@@ -9,9 +9,11 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, freeze
 from harness.core.number_format import CHI_QUANTILE, NORMAL_QUANTILE, Interval
 from harness.errors import BadInput, NotComparable
-from harness.measure.angular_speed import TimeOffset, coarse_offset, record_period_s
+from harness.measure.angular_speed import LEAST_OVERLAP_S, TimeOffset, coarse_offset
 from harness.measure.conventions import (
+    MOST_CLOCK_ERROR,
     MOST_PLACE_M,
+    MOST_PLAIN_CLOCK_ERROR,
     require_clock,
     require_orientations,
     require_positions,
@@ -19,8 +21,9 @@ from harness.measure.conventions import (
     require_scale,
 )
 from harness.measure.gauss_markov import ErrorProcess
-from harness.measure.handeye import PosePairs, solve_hand_eye
+from harness.measure.handeye import PosePairs, solve_trimmed
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline, require_pairs
+from harness.measure.reference_noise import correct_for_reference
 from harness.measure.registration_fit import FittedRegistration, StationGrid, fit_registration
 from harness.measure.registration_model import (
     AHEAD,
@@ -34,16 +37,17 @@ from harness.measure.registration_model import (
     SHARED,
     RegistrationState,
 )
+from harness.measure.sampling import mean_period_s, own_places_s
 
-LEAST_OVERLAP_S = 10.0
-"""Shortest common motion of capture and reference [s]."""
 LEAST_MATCHED = 0.95
 """Smallest share of the records due in the overlap that must have a pose, and the reference at their time."""
-LEAST_CORRELATION = 0.5
+LEAST_CORRELATION = 0.65
 """Smallest correlation of angular speeds with which motion counts as the reference's."""
 _OF_IT = "of it"
 MOST_DEVIATION = {"m": 0.05, "rad": float(np.deg2rad(10.0)), "s": 0.05, _OF_IT: 0.1}
 """Largest standard deviation by unit; a parameter with a larger one is not observable."""
+_PLAIN_DEVIATIONS = 3.0
+"""Factor of `MOST_DEVIATION` for sources of unknown noise, whose deviations contain Student's t [choice]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +94,8 @@ class MountFit:
 class StationResiduals:
     """What remains of N readings of a station after registration; a grid of its records in time."""
 
+    period_s: float
+    """Step of the grid [s]; more places than records where the records are uneven."""
     truth_s: Floats
     """(N,) time of the reference's clock, by the offset of orientation [s]."""
     position_m: Floats
@@ -127,6 +133,8 @@ class Registration:
     """
     mounts: Mapping[str, MountFit]
     errors: Mapping[str, StationResiduals]
+    explained: Mapping[str, tuple[float, float]]
+    """Station -> shares of the variance of its positions and orientations that the model explains, up to 1."""
     world_from_tracker: Floats
     """(4,) unit quaternion."""
     tracker_origin_m: Floats
@@ -148,7 +156,10 @@ class Registration:
 
     @property
     def reference_s(self) -> float:
-        """Time of the reference's clock at which the offsets hold [s]: the middle of the overlap."""
+        """Time of the reference's clock at which the offsets hold [s]: the middle of the overlap.
+
+        For a source of unknown noise it is the time at which the offset is known best.
+        """
         return self.state.reference_s
 
     def room_point(self, point_m: Floats) -> tuple[Interval, Interval, Interval]:
@@ -171,20 +182,24 @@ def register_poses(
     pairs: Mapping[str, str] | None = None,
     least_overlap_s: float = LEAST_OVERLAP_S,
     least_matched: float = LEAST_MATCHED,
+    truth_noise: Mapping[str, tuple[float, float]] | None = None,
+    plain: bool = False,
 ) -> Registration:
     """Register stations with the reference motion of the bodies that carry them.
 
-    `pairs` names the body of each station; by default stations and bodies with the same name. BadInput without stamps,
-    for another motion, and for other axes or units of the reference. NotComparable for little overlap, few matched
-    records and motion about one axis; it names what is not observable.
+    `pairs` names the body of each station; by default stations and bodies with the same name. `truth_noise` holds the
+    standard deviations of the positions [m] and rotations [rad] of bodies, which enter the intervals. `plain` is for
+    sources of unknown noise (`registration_fit`), of which nothing says which axis is vertical: they have no heading
+    error. BadInput without stamps, for another motion, and for other axes or units of the reference. NotComparable for
+    little overlap, few matched records and motion about one axis; it names what is not observable.
     """
     named = dict(pairs) if pairs is not None else {name: name for name in stations if name in truths}
     require_pairs(stations, truths, named)
     splines = {station: TruthSpline(truths[body]) for station, body in named.items()}
     chosen = {station: stations[station] for station in named}
     require_stamps(chosen)
-    period_s = record_period_s(chosen)
-    coarse = coarse_offset(chosen, splines, period_s, least_overlap_s)
+    period_s = mean_period_s([station.measured_s for station in chosen.values()])
+    coarse = coarse_offset(chosen, splines, least_overlap_s)
     if not coarse.correlation >= LEAST_CORRELATION:
         raise BadInput(
             f"Angular speeds of capture and reference correlate by {coarse.correlation:.2f} at best.",
@@ -192,18 +207,31 @@ def register_poses(
         )
     grids, matched, overlap_s, middle_s = _make_grids(chosen, splines, period_s, coarse, least_matched)
     start = _start(grids, list(splines.values()), coarse.offset_s, middle_s)
-    fit = fit_registration(list(grids.values()), list(splines.values()), start)
+    kept = (HEADING,) if plain else ()
+    fit = fit_registration(list(grids.values()), list(splines.values()), start, kept, plain=plain)
+    if truth_noise:
+        noise = [truth_noise.get(body, (0.0, 0.0)) for body in named.values()]
+        fit = correct_for_reference(
+            fit, list(grids.values()), [truths[body] for body in named.values()], noise, kept, plain=plain
+        )
     require_orientations([rest[grid.known, 3:] for rest, grid in zip(fit.residuals, grids.values(), strict=True)])
     factor = 1.0 + fit.state.scale
-    places_m = {name: rest[grid.known, :3] for rest, (name, grid) in zip(fit.residuals, grids.items(), strict=True)}
-    if max(np.nanstd(truths[body].position_m, axis=0).max() for body in named.values()) > MOST_PLACE_M:
+    places_m = {name: rest[used[:, 0], :3] for rest, used, name in zip(fit.residuals, fit.used, grids, strict=True)}
+    extent_m = max(_extent_m(truths[body].position_m) for body in named.values())
+    if extent_m > MOST_PLACE_M:
         known = np.sqrt(fit.covariance[HEADING, HEADING]) <= MOST_DEVIATION["rad"]
-        require_positions(places_m, factor, fit.state.heading_rad if known else 0.0)
+        require_positions(places_m, factor, fit.state.heading_rad if known else 0.0, extent_m)
     if np.sqrt(fit.covariance[SCALE, SCALE]) <= MOST_DEVIATION[_OF_IT] * abs(factor):
         require_scale(factor)  # first, because the limits below are in metres
-    _require_observable(fit, list(named))
-    require_clock(fit.state.clock_ratio, float(np.sqrt(fit.covariance[CLOCK, CLOCK])))
+    _require_observable(fit, list(named), _PLAIN_DEVIATIONS if plain else 1.0)
+    most = MOST_PLAIN_CLOCK_ERROR if plain else MOST_CLOCK_ERROR
+    require_clock(fit.state.clock_ratio, float(np.sqrt(fit.covariance[CLOCK, CLOCK])), most)
     return _result(named, grids, fit, coarse.correlation, overlap_s, matched)
+
+
+def _extent_m(position_m: Floats) -> float:
+    """RMS distance of positions (N, 3) from their mean [m]; rows of NaN do not count."""
+    return float(np.sqrt(np.nansum(np.nanvar(position_m, axis=0))))
 
 
 def require_stamps(stations: Mapping[str, MeasuredPoses]) -> None:
@@ -230,8 +258,9 @@ def _make_grids(
         begins += [float(at_s.min()), float(splines[name].time_s[0])]
         ends += [float(at_s.max()), float(splines[name].time_s[-1])]
     begin_s, end_s = max(begins), min(ends)
+    step_s = own_places_s([station.measured_s[station.valid] for station in stations.values()], period_s)
     grids = {
-        name: _make_grid(station, splines[name], period_s, coarse.offset_s, begin_s, end_s)
+        name: _make_grid(station, splines[name], step_s, coarse.offset_s, begin_s, end_s)
         for name, station in stations.items()
     }
     due = len(grids) * max((end_s - begin_s) / period_s, 1.0)
@@ -239,7 +268,8 @@ def _make_grids(
     if matched < least_matched:
         raise NotComparable(
             f"{100.0 * matched:.1f} % of the records due in the overlap have a pose and a reference.",
-            f"At least {100.0 * least_matched:g} % must match; look for gaps in both recordings.",
+            f"At least {100.0 * least_matched:g} % must match; look for gaps in both recordings, or accept fewer "
+            "(--least-matched 0.6).",
         )
     return grids, matched, end_s - begin_s, 0.5 * (begin_s + end_s)
 
@@ -272,10 +302,10 @@ def _start(
         body_m, body = spline.poses(grid.measured_s[grid.known] - offset_s)
         paired.append(PosePairs(grid.position_m[grid.known], grid.turn[grid.known], body_m, body))
     require_same_hand([one.position_m for one in paired], [one.body_m for one in paired])
-    return replace(solve_hand_eye(paired, with_scale=False), reference_s=middle_s, offset_s=offset_s)
+    return replace(solve_trimmed(paired, with_scale=False), reference_s=middle_s, offset_s=offset_s)
 
 
-def _require_observable(fit: FittedRegistration, stations: list[str]) -> None:
+def _require_observable(fit: FittedRegistration, stations: list[str], factor: float) -> None:
     deviation = np.sqrt(np.diag(fit.covariance))
     checks = [
         ("the room's rotation", "rad", deviation[ROOM_TURN]),
@@ -291,7 +321,7 @@ def _require_observable(fit: FittedRegistration, stations: list[str]) -> None:
         checks += [(f"the position of {name} on its body", "m", own[3:])]
     for what, unit, values in checks:
         worst = float(np.max(values))
-        if not worst <= MOST_DEVIATION[unit]:
+        if not worst <= factor * MOST_DEVIATION[unit]:
             raise NotComparable(
                 f"Not observable from this motion: {what} (standard deviation {worst:.2g} {unit}).",
                 "Turn every body about two axes and move through the room.",
@@ -326,7 +356,7 @@ def _result(
             for axis in range(3)
         },
     }
-    mounts, errors = {}, {}
+    mounts, errors, explained = {}, {}, {}
     for s, (station, body) in enumerate(pairs.items()):
         own = slice(SHARED + OWN * s, SHARED + OWN * (s + 1))
         mounts[station] = MountFit(
@@ -335,13 +365,23 @@ def _result(
         grid, residual = grids[station], fit.residuals[s]
         truth_s = state.truth_time_s(grid.measured_s)
         errors[station] = StationResiduals(
-            truth_s, residual[:, :3], residual[:, 3:], grid.known, fit.used[s], fit.noise[s]
+            grid.period_s, truth_s, residual[:, :3], residual[:, 3:], grid.known, fit.used[s], fit.noise[s]
         )
+        explained[station] = _explained(grid, residual)
     room = slice(0, ROOM_ORIGIN.stop)
     return Registration(
-        values, mounts, errors, rotations.inverse(state.tracker_from_world), state.tracker_origin_m,
+        values, mounts, errors, explained, rotations.inverse(state.tracker_from_world), state.tracker_origin_m,
         covariance[room, room], state, correlation, overlap_s, matched, blocks,
     )  # fmt: skip
+
+
+def _explained(grid: StationGrid, residual: Floats) -> tuple[float, float]:
+    """Shares of the variance of positions and orientations that are not in residuals (N, 6)."""
+    place, turn, rest = grid.position_m[grid.known], grid.turn[grid.known], residual[grid.known]
+    middle = rotations.inverse(rotations.mean_rotation(turn))
+    parts = (place - place.mean(axis=0), rest[:, :3]), (rotations.log(rotations.multiply(turn, middle)), rest[:, 3:])
+    first, second = (1.0 - float(np.sum(left**2) / max(np.sum(total**2), 1e-300)) for total, left in parts)
+    return first, second
 
 
 def _vector(measured: Floats, nominal: Floats) -> Floats:

@@ -3,20 +3,27 @@
 The fit alternates three steps: readings that do not agree are left out, the noise of each station is fitted to what
 remains, and generalised least squares gives the parameters. The covariance is that of the fitted noise; where blocks of
 time longer than five correlation times scatter more than it says, it is enlarged.
+
+The noise of an unknown source need not be of that kind. Plain least squares then weigh all readings alike, and only
+those far from all others are left out. Orientations alone give rotations, time offset and clock; positions give the
+rest. The covariance is the scatter of blocks.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, find_runs
+from harness.core.number_format import NORMAL_QUANTILE
 from harness.measure.gauss_markov import ErrorProcess, fit_process
 from harness.measure.pose_series import TruthSpline
-from harness.measure.registration_model import OWN, SHARED, RegistrationState, linearise
+from harness.measure.registration_model import CLOCK, OFFSET, OWN, SHARED, RegistrationState, linearise
 
-OUTLIER = 4.0
-"""Residuals larger than this many robust deviations are left out."""
+OUTLIER, PLAIN_OUTLIER = 4.0, 20.0
+"""Residuals of more robust deviations are left out; the second number is for orientations by plain least squares."""
 BLOCK_CORRELATIONS = 5.0
 """Length of a block of the covariance, in correlation times."""
 FEWEST_BLOCKS = 6
@@ -25,8 +32,14 @@ _AXES = ((0, 1, 2), (3, 4), (5,))
 """Axes of a reading with one noise: position, pitch and roll, yaw."""
 _CHI_MEDIAN = 1.538
 """Median length of a vector of three standard normal numbers."""
+_REFITS = 3
+"""Steps of generalised least squares, which is nearly linear."""
 _LONG_S, _AROUND_S = 0.4, 0.3
 """A run of outliers of this length is an excursion, whose ends are hidden in noise for this time [s]."""
+
+
+StationNoise: TypeAlias = tuple[ErrorProcess, ErrorProcess, ErrorProcess]
+"""Noise of position, pitch and roll, and yaw of a station."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,25 +70,61 @@ class FittedRegistration:
     """(N, 6) for each station: position [m] and rotation vector [rad]."""
     used: tuple[Bools, ...]
     """(N, 2) for each station: whether position and orientation were used."""
-    noise: tuple[tuple[ErrorProcess, ErrorProcess, ErrorProcess], ...]
+    noise: tuple[StationNoise, ...]
     """Position, pitch and roll, and yaw of each station."""
 
 
 def fit_registration(
-    grids: Sequence[StationGrid], truths: Sequence[TruthSpline], start: RegistrationState, fixed: Sequence[int] = ()
+    grids: Sequence[StationGrid],
+    truths: Sequence[TruthSpline],
+    start: RegistrationState,
+    fixed: Sequence[int] = (),
+    *,
+    plain: bool = False,
 ) -> FittedRegistration:
-    """Fit all parameters of S stations but those `fixed`, from a start within some degrees and tenths of a second."""
+    """Fit all parameters of S stations but those `fixed`, from a start within some degrees and tenths of a second.
+
+    `plain` is for sources of unknown noise: plain least squares instead of generalised ones.
+    """
     state = _fit_loosely(grids, truths, start, fixed)
     for _ in range(2):
-        residuals = [_linear(state, s, grids, truths)[0] for s in range(len(grids))]
-        used = [_agreeing(r, g) for r, g in zip(residuals, grids, strict=True)]
+        residuals = refit_residuals(state, grids, truths)
+        used = [_agreeing(r, g, PLAIN_OUTLIER if plain else OUTLIER) for r, g in zip(residuals, grids, strict=True)]
         noise = [_fit_noise(r, u, g.period_s) for r, u, g in zip(residuals, used, grids, strict=True)]
-        for _ in range(3):
-            step, information, meat, blocks = _whitened_step(state, grids, truths, used, noise, fixed)
+        for _ in range(_REFITS):
+            step, sums = _whitened_step(state, grids, truths, used, noise, fixed, plain)
             state = state.moved(step)
-    covariance = _covariance(information, meat, blocks, fixed)
-    residuals = [_linear(state, s, grids, truths)[0] for s in range(len(grids))]
-    return FittedRegistration(state, covariance, blocks, tuple(residuals), tuple(used), tuple(noise))
+    covariance = (
+        _plain_covariance(sums, fixed) if plain else _covariance(sums.information, sums.meat, sums.blocks, fixed)
+    )
+    blocks = sums.blocks
+    if plain and CLOCK not in fixed:
+        state, covariance = _move_reference(state, covariance, sums.information, fixed)
+    residuals = refit_residuals(state, grids, truths)
+    return FittedRegistration(state, covariance, blocks, residuals, tuple(used), tuple(noise))
+
+
+def refit_residuals(
+    state: RegistrationState, grids: Sequence[StationGrid], truths: Sequence[TruthSpline]
+) -> tuple[Floats, ...]:
+    """(N, 6) residuals of each station under a state: position [m] and rotation vector [rad]."""
+    return tuple(_linear(state, s, grids, truths)[0] for s in range(len(grids)))
+
+
+def refit_steps(
+    fit: FittedRegistration,
+    grids: Sequence[StationGrid],
+    truths: Sequence[TruthSpline],
+    fixed: Sequence[int] = (),
+    *,
+    plain: bool = False,
+) -> Floats:
+    """Step (11 + 6 S,) from a fit to that with other references, by the readings and the noise of the fit."""
+    state, total = fit.state, np.zeros(SHARED + OWN * len(grids))
+    for _ in range(_REFITS):
+        step, _ = _whitened_step(state, grids, truths, fit.used, fit.noise, fixed, plain)
+        state, total = state.moved(step), total + step
+    return total
 
 
 def _linear(
@@ -122,13 +171,13 @@ def _fit_loosely(
     return state
 
 
-def _agreeing(residual: Floats, grid: StationGrid) -> Bools:
+def _agreeing(residual: Floats, grid: StationGrid, most_turn: float = OUTLIER) -> Bools:
     """(N, 2) whether position and orientation agree with the model."""
     out = np.zeros((len(residual), 2), bool)
-    for column, part in enumerate((slice(0, 3), slice(3, 6))):
+    for column, (part, limit) in enumerate(((slice(0, 3), OUTLIER), (slice(3, 6), most_turn))):
         length = np.linalg.norm(residual[:, part], axis=1)
         deviation = float(np.median(length[grid.known])) / _CHI_MEDIAN
-        outlying = grid.known & (length > OUTLIER * deviation)
+        outlying = grid.known & (length > limit * deviation)
         near = outlying.copy()
         for begin, end in find_runs(_joined(outlying, grid.known)):
             around = round(_AROUND_S / grid.period_s) if (end - begin) * grid.period_s >= _LONG_S else 1
@@ -144,7 +193,7 @@ def _joined(outlying: Bools, known: Bools) -> Bools:
     return out
 
 
-def _fit_noise(residual: Floats, used: Bools, period_s: float) -> tuple[ErrorProcess, ErrorProcess, ErrorProcess]:
+def _fit_noise(residual: Floats, used: Bools, period_s: float) -> StationNoise:
     place, tilt, yaw = (
         fit_process(np.ascontiguousarray(residual[:, list(axes)]), used[:, int(axes[0] >= 3)], period_s)
         for axes in _AXES
@@ -152,39 +201,107 @@ def _fit_noise(residual: Floats, used: Bools, period_s: float) -> tuple[ErrorPro
     return place, tilt, yaw
 
 
+@dataclass(frozen=True, eq=False)
+class _NormalSums:
+    """Sums of least squares over all stations, P parameters."""
+
+    information: Floats
+    """(P, P) of the parameters that a reading is used for."""
+    coupling: Floats
+    """(P, P) the same with the slopes of positions by rotations and clocks, which plain least squares do not use."""
+    meat: Floats
+    """(P, P) scatter of the gradients of blocks."""
+    blocks: int
+
+
 def _whitened_step(
     state: RegistrationState,
     grids: Sequence[StationGrid],
     truths: Sequence[TruthSpline],
     used: Sequence[Bools],
-    noise: Sequence[tuple[ErrorProcess, ErrorProcess, ErrorProcess]],
+    noise: Sequence[StationNoise],
     fixed: Sequence[int],
-) -> tuple[Floats, Floats, Floats, int]:
-    """One step of generalised least squares, the information, its scatter over blocks, and their number."""
+    plain: bool = False,
+) -> tuple[Floats, _NormalSums]:
+    """One step of least squares, and its sums."""
     size = SHARED + OWN * len(grids)
-    information, score, scores = np.zeros((size, size)), np.zeros(size), []
+    information, coupling, score, scores = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size), []
     for s, grid in enumerate(grids):
         residual, slope = _linear(state, s, grids, truths)
         longest_s = max(process.correlation_s for process in noise[s])
         block_rows = max(min(round(BLOCK_CORRELATIONS * longest_s / grid.period_s), len(residual) // FEWEST_BLOCKS), 1)
-        gradient = np.zeros((len(residual), SHARED + OWN))
-        for process, axes in zip(noise[s], _AXES, strict=True):
+        gradient, mine = np.zeros((len(residual), SHARED + OWN)), np.ix_(_columns(s), _columns(s))
+        weights = _alike(noise[s]) if plain else noise[s]
+        for process, axes in zip(weights, _AXES, strict=True):
             valid = used[s][:, int(axes[0] >= 3)]
             for axis in axes:
                 values = np.concatenate([slope[:, axis], residual[:, axis, None]], axis=1)
                 white = process.whiten(values, valid, grid.period_s)
                 rows, errors = white[:, :-1], white[:, -1]
-                information[np.ix_(_columns(s), _columns(s))] += rows.T @ rows
-                gradient += rows * errors[:, None]
+                chosen = rows
+                if plain and axis < 3:
+                    chosen = rows.copy()
+                    chosen[:, _BY_ORIENTATIONS] = 0.0
+                    coupling[mine] += chosen.T @ rows
+                information[mine] += chosen.T @ chosen
+                gradient += chosen * errors[:, None]
         score[_columns(s)] += gradient.sum(axis=0)
         edges = np.arange(0, len(gradient), block_rows)
-        mine = np.zeros((len(edges), size))
-        mine[:, _columns(s)] = np.add.reduceat(gradient, edges, axis=0)
-        scores.append(mine)
-    blocks = min(len(mine) for mine in scores)
+        sums = np.zeros((len(edges), size))
+        sums[:, _columns(s)] = np.add.reduceat(gradient, edges, axis=0)
+        scores.append(sums)
+    blocks = min(len(sums) for sums in scores)
     centred = np.concatenate(scores)
     meat = centred.T @ centred * blocks / max(blocks - 1, 1)
-    return _solve(information, score, fixed), information, meat, blocks
+    return _solve(information, score, fixed), _NormalSums(information, coupling, meat, blocks)
+
+
+def _alike(noise: StationNoise) -> StationNoise:
+    """White noise of the same size, and of one size about all axes: nothing says which one is vertical."""
+    place, tilt, yaw = (math.hypot(one.white, one.drift) for one in noise)
+    turn = ErrorProcess(math.sqrt((2.0 * tilt**2 + yaw**2) / 3.0), 0.0, 1.0)
+    return ErrorProcess(place, 0.0, 1.0), turn, turn
+
+
+_BY_ORIENTATIONS = [0, 1, 2, OFFSET, CLOCK]
+"""Parameters that plain least squares find by orientations alone, of those on which positions depend."""
+
+
+def _move_reference(
+    state: RegistrationState, covariance: Floats, information: Floats, fixed: Sequence[int]
+) -> tuple[RegistrationState, Floats]:
+    """Move the time of the offset to where the clocks' rate does not change it: as one finds it without the rate."""
+    free = _free(len(information), fixed)
+    inverse = np.linalg.pinv(information[np.ix_(free, free)], rcond=1e-13)
+    offset, clock = free.index(OFFSET), free.index(CLOCK)
+    later_s = float(-inverse[offset, clock] / max(inverse[clock, clock], 1e-300))
+    moved = np.array(covariance)
+    moved[OFFSET] += later_s * moved[CLOCK]
+    moved[:, OFFSET] += later_s * moved[:, CLOCK]
+    at_s, offset_s = state.reference_s + later_s, state.offset_s + later_s * state.clock_ratio
+    return replace(state, reference_s=at_s, offset_s=offset_s), moved
+
+
+def _plain_covariance(sums: _NormalSums, fixed: Sequence[int]) -> Floats:
+    """Scatter of the estimates over blocks, with Student's t for their number; fixed parameters have none.
+
+    An error of what orientations give moves what positions give: the matrix of the equations is block triangular.
+    """
+    from scipy import special
+
+    free = _free(len(sums.information), fixed)
+    inside, shown = np.ix_(free, free), np.zeros_like(sums.information)
+    whole = sums.information.copy()
+    cross = np.ix_([i for i in range(len(whole)) if i not in _BY_ORIENTATIONS], _BY_ORIENTATIONS)
+    whole[cross] += sums.coupling[cross]
+    scale = np.sqrt(np.maximum(np.diag(sums.information)[free], 1e-300))
+    inverse = np.linalg.pinv(whole[inside] / scale[:, None] / scale, rcond=1e-13) / scale[:, None] / scale
+    sandwich = inverse @ sums.meat[inside] @ inverse.T
+    least = np.diag(_covariance(sums.information, np.zeros_like(whole), sums.blocks, fixed))[free]
+    factor = np.sqrt(np.maximum(least / np.maximum(np.diag(sandwich), 1e-300), 1.0))
+    student = float(special.stdtrit(max(sums.blocks - 1, 1), 0.975)) / NORMAL_QUANTILE
+    shown[inside] = sandwich * factor[:, None] * factor * student**2
+    return shown
 
 
 def _free(size: int, fixed: Sequence[int]) -> list[int]:

@@ -3,8 +3,11 @@
 The vector from one station to the other is constant in the frame of the bar. What it changes by is the error of both
 stations. A position that is measured at another moment than the orientation shows as an error along the relative
 velocity of the two stations: (p_b - p_a) = R r + ahead d/dt (R r), with the bar's rotation R and vector r.
+
+A bar whose length was measured also shows the bias of the length over the volume (ASTM E3064). The bar need not rest.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,8 +16,9 @@ from scipy import special
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
-from harness.core.number_format import Interval
+from harness.core.number_format import NORMAL_QUANTILE, Interval
 from harness.errors import BadInput
+from harness.measure.uncertainty import BudgetComponent, UncertaintyBudget
 
 SPEED_EDGES_M_S = (0.0, 0.05, 0.25, 0.5, 1.0, 2.0, 4.0)
 """Edges of the classes of speed [m/s]; the first class is rest [choice]."""
@@ -23,6 +27,8 @@ _MAX_STEP_S = 0.1
 _BLOCK_S = 5.0
 """Length of the blocks whose sums give the intervals [s]: five correlation times of the drift."""
 _MIN_BLOCKS = 6
+_PLACES = 4
+"""Classes of place."""
 _OUTLIER = 5.0
 """Errors beyond this many median absolute values are left out: echoes and excursions."""
 _MIN_TURN_SPEED_M_S = 0.05
@@ -40,6 +46,18 @@ class SpeedClass:
 
 
 @dataclass(frozen=True)
+class PlaceClass:
+    """Length of the bar in one class of distance from the tracker's origin."""
+
+    from_m: float
+    to_m: float
+    length_m: Interval
+    """Mean length [m]."""
+    spread_m: float
+    """Standard deviation of the length [m]."""
+
+
+@dataclass(frozen=True)
 class RigidPair:
     """What two stations on one bar show."""
 
@@ -52,6 +70,10 @@ class RigidPair:
     """Time by which positions run ahead of orientations [s]: `components.speed.ahead_s` of a scenario."""
     speeds: tuple[SpeedClass, ...]
     """Classes of speed in which the pair was measured."""
+    places: tuple[PlaceClass, ...]
+    """Classes of place, of as many readings each."""
+    budget: UncertaintyBudget
+    """Uncertainty of the length of a single reading [m]."""
 
 
 def measure_rigid_pair(
@@ -59,10 +81,12 @@ def measure_rigid_pair(
     time_s: tuple[Floats, Floats],
     position_m: tuple[Floats, Floats],
     tracker_from_station: tuple[Floats, Floats],
+    stated_m: tuple[float, float] | None = None,
 ) -> RigidPair:
     """Measure two stations on one bar from their valid readings: times (N,), positions (N, 3), quaternions (N, 4).
 
-    The second station is interpolated at the times of the first. BadInput with fewer than `_MIN_BLOCKS` blocks of
+    `stated_m` is the length of the bar that somebody measured, and its standard uncertainty. The second station is
+    interpolated at the times of the first. BadInput with fewer than `_MIN_BLOCKS` blocks of
     common readings.
     """
     rows, b_m, b_turn = _at_times_of_first(time_s, position_m[1], tracker_from_station[1])
@@ -82,10 +106,16 @@ def measure_rigid_pair(
     size_m = np.linalg.norm(error_m, axis=1)
     kept = np.isfinite(relative_m_s).all(axis=1) & np.isfinite(speed_m_s)
     kept &= size_m < _OUTLIER * np.median(size_m[kept]) if kept.any() else False
+    if not kept.any():
+        found = f"{stations[0]} and {stations[1]} have no three readings within {2.0 * _MAX_STEP_S:g} s."
+        raise BadInput(found, "Record the bar at a higher rate.")
+    length_m, away_m = np.linalg.norm(vector_m[kept], axis=1), np.linalg.norm(0.5 * (a_m + b_m)[kept], axis=1)
+    length = _mean(length_m, block[kept])
+    places = _places(length_m, away_m, block[kept])
     columns = error_m[kept], relative_m_s[kept], twist_rad[kept], speed_m_s[kept], block[kept]
     return RigidPair(
         stations,
-        _mean(np.linalg.norm(vector_m[kept], axis=1), block[kept]),
+        length,
         _rms(np.linalg.norm(columns[2], axis=1), columns[4]),
         _ahead(columns[0], columns[1], columns[4]),
         tuple(
@@ -93,7 +123,40 @@ def measure_rigid_pair(
             for low, high in pairwise(SPEED_EDGES_M_S)
             if len(np.unique(block[kept][inside := (columns[3] >= low) & (columns[3] < high)])) >= _MIN_BLOCKS
         ),
+        places,
+        _budget(length_m, length, places, block[kept], stated_m),
     )
+
+
+def _places(length_m: Floats, away_m: Floats, block: Ints) -> tuple[PlaceClass, ...]:
+    """Quarters of the readings by their distance from the tracker's origin; one class for a bar in one place."""
+    edges = np.unique(np.quantile(away_m, np.linspace(0.0, 1.0, _PLACES + 1)))
+    out = []
+    for low, high in pairwise(edges.tolist()):
+        inside = (away_m >= low) & (away_m <= high)
+        if len(np.unique(block[inside])) > 1:
+            out.append(PlaceClass(low, high, _mean(length_m[inside], block[inside]), float(np.std(length_m[inside]))))
+    return tuple(out)
+
+
+def _budget(
+    length_m: Floats, length: Interval, places: Sequence[PlaceClass], block: Ints, stated_m: tuple[float, float] | None
+) -> UncertaintyBudget:
+    """Repeatability at one place, change over the volume, and the stated length with its uncertainty."""
+    components = []
+    if places:
+        within = float(np.sqrt(np.mean([one.spread_m**2 for one in places])))
+        components.append(BudgetComponent("repeatability", within, "A", float(len(np.unique(block)) - 1)))
+    if len(places) > 1:
+        over = float(np.std([one.length_m.value for one in places], ddof=1))
+        components.append(BudgetComponent("change over the volume", over, "A", float(len(places) - 1)))
+    bias = Interval.missing("Nobody stated the length of the bar: --length MM,MM.")
+    if stated_m is not None:
+        components.append(BudgetComponent("stated length", stated_m[1], "B"))
+        half = float(np.hypot(0.5 * (length.high - length.low), NORMAL_QUANTILE * stated_m[1]))
+        value = length.value - stated_m[0]
+        bias = Interval(value, value - half, value + half, length.count)
+    return UncertaintyBudget("length of the bar", "m", tuple(components), bias)
 
 
 def _at_times_of_first(time_s: tuple[Floats, Floats], b_m: Floats, b_turn: Floats) -> tuple[Ints, Floats, Floats]:

@@ -9,7 +9,7 @@ import numpy as np
 from harness.core.arrays import Bools, Floats
 from harness.core.ranges import Range, check_fields
 from harness.errors import BadInput
-from harness.stream.is900.codec import BITS_PER_BYTE, STANDARD_LIST, record_size
+from harness.stream.polhemus.codec import BITS_PER_BYTE, STANDARD_LIST, record_size
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from harness.simulate.readings import SimulatedReadings
 from harness.simulate.rest_pieces import START_S, STOP_S
 from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.is900.codec import DeviceSamples, FilterSamples
+from harness.stream.polhemus.codec import DeviceSamples, FilterSamples
 
 SHORTEST_RETURN_S, WALK_M_S, TURN_RAD_S = 1.0, 1.2, 2.0
 """Shortest duration of the return [s], and the walking speed and turning rate that may lengthen it."""

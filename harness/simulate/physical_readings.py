@@ -22,7 +22,7 @@ from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.station_displacement import BodyMotionSource, StationDisplacement
 from harness.simulate.readings import FilterReadings, SimulatedReadings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.is900.codec import FilterSamples
+from harness.stream.polhemus.codec import FilterSamples
 
 _LEAD_OUT_S = 0.5
 """Motion after the take: the last slot may end later than it [s]."""

@@ -10,7 +10,7 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.seeds import generator
 from harness.errors import UnknownName
-from harness.stream.is900.codec import Emitter
+from harness.stream.polhemus.codec import Emitter
 
 GRAVITY_M_S2 = 9.81
 

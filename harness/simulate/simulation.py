@@ -20,7 +20,7 @@ from harness.simulate.physical_readings import apply_device_settings, simulate_p
 from harness.simulate.readings import SimulatedReadings
 from harness.simulate.trajectory import Trajectory
 from harness.stream import TrackerFrame
-from harness.stream.is900.codec import (
+from harness.stream.polhemus.codec import (
     ByteCapture,
     FrameReader,
     RecordValues,

@@ -6,25 +6,41 @@ from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
     from harness.stream.frame import TrackerFrame, TrackerStream, split_frames
-    from harness.stream.host_clock import HostClockEstimator
+    from harness.stream.host_clock import HostClockEstimator, UnixTimeEstimator
     from harness.stream.inputs import INPUT_COMBINATIONS, make_inputs
     from harness.stream.line_events import EventCounter, LineEvent
+    from harness.stream.ports import TrackerConfig, open_tracker_at
+    from harness.stream.poses.options import PoseFileOptions
+    from harness.stream.poses.pose_file import UNTIMED
+    from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
+    from harness.stream.poses.pose_statistics import measure_sampling
     from harness.stream.station_counts import FRAME_COLUMNS, StationCounts, StreamSummary, format_csv_row, frame_rows
+    from harness.stream.tracker import OpenTracker
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
 __all__ = [
     "FRAME_COLUMNS",
     "INPUT_COMBINATIONS",
+    "UNTIMED",
+    "BodyPoses",
     "EventCounter",
+    "FileFinding",
     "HostClockEstimator",
     "LineEvent",
+    "OpenTracker",
+    "PoseFileOptions",
+    "PoseLog",
     "StationCounts",
     "StreamSummary",
+    "TrackerConfig",
     "TrackerFrame",
     "TrackerStream",
+    "UnixTimeEstimator",
     "format_csv_row",
     "frame_rows",
     "make_inputs",
+    "measure_sampling",
+    "open_tracker_at",
     "split_frames",
 ]

@@ -88,8 +88,8 @@ class TrackerStream(Protocol):
     """Interface of a source of frames.
 
     Times strictly increase. Stations and their order never change. A silent station is an invalid row, never a repeated
-    one. A frame closes when the station number does not increase, or after 1.5 periods. Closing the stream ends the
-    iteration without an exception.
+    one. A frame of a device closes when the station number does not increase, or after 1.5 periods. A pose log has no
+    period: its frames hold the poses of one time. Closing the stream ends the iteration without an exception.
     """
 
     @property

@@ -1,7 +1,10 @@
 """Times of measurement on the host's clock, estimated from the device's time stamps."""
 
+from collections.abc import Callable
+
 import numpy as np
 
+from harness.core.arrays import Floats
 from harness.stream.frame import TrackerFrame
 
 _MAX_DRIFT = 1e-4
@@ -40,3 +43,20 @@ class HostClockEstimator:
         self._difference_s = difference_s if clock_reset else min(difference_s, drifted_s)
         self._received_s = frame.received_s
         return float(stamps_s.mean()) + self._difference_s
+
+
+class UnixTimeEstimator:
+    """Times of measurement of stations since 1970, by a host's clock; call it once for each frame, in order."""
+
+    def __init__(self, wall_s: Callable[[float], float]) -> None:
+        """`wall_s` converts times on the host's monotonic clock to seconds since 1970."""
+        self._wall_s, self._host_clock = wall_s, HostClockEstimator()
+
+    def __call__(self, frame: TrackerFrame) -> Floats:
+        """(S,) times of measurement since 1970 [s]; NaN where a station has no stamp, and others have."""
+        stamps_s, host_s = frame.measured_s, self._wall_s(self._host_clock.measured_s(frame))
+        present = ~np.isnan(stamps_s)
+        if not present.any():
+            return np.full(len(stamps_s), host_s)
+        out: Floats = host_s + (stamps_s - stamps_s[present].mean())
+        return out

@@ -3,11 +3,12 @@ it.
 """
 
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal, Protocol
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Protocol, runtime_checkable
 
-from harness.stream.is900.codec.reader import WireFormat
+from harness.stream.frame import TrackerFrame
+from harness.stream.polhemus.codec.reader import WireFormat
 
 LineEventKind = Literal[
     "connected",  # streaming, for the first time or again
@@ -21,6 +22,7 @@ LineEventKind = Literal[
     "present",  # a station that was missing sends again
     "unexpected",  # a station that the session did not ask for was switched on
     "out of range",  # a station is farther away than the output list can report
+    "device error",  # records carry an error of the device's own tests
     "settings",  # another program left settings in the device, or they are put back
     "refused",  # the device that came back cannot be used as it is
 ]
@@ -38,7 +40,15 @@ class LineEvent:
     text: str
 
 
-class LineObserver(Protocol):
+class EventObserver(Protocol):
+    """Interface of an observer of events on the line."""
+
+    def on_event(self, event: LineEvent) -> None:
+        """Take an event on the line."""
+        ...
+
+
+class LineObserver(EventObserver, Protocol):
     """Interface of an observer of the line: it sees all bytes and events in order. `RecordingWriter` is one."""
 
     def on_received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
@@ -55,8 +65,32 @@ class LineObserver(Protocol):
         """
         ...
 
-    def on_event(self, event: LineEvent) -> None:
-        """Take an event on the line."""
+
+@dataclass(frozen=True)
+class TrackedBodies:
+    """What the poses of a tracker that reports no bytes are of."""
+
+    names: tuple[str, ...]
+    """Station names, in the order of the rows of a frame."""
+    source: str
+    clock: str
+    """What `measured_s` counts, in words."""
+    start_unix_s: float
+    """Unix time of the zero of `measured_s` [s]."""
+    assumed: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """What the tracker does not tell: the value that is assumed, and why, by subject."""
+
+
+@runtime_checkable
+class PoseObserver(EventObserver, Protocol):
+    """Interface of an observer of a tracker that reports poses. `PoseRecordingWriter` is one."""
+
+    def on_bodies(self, bodies: TrackedBodies) -> None:
+        """Take what the frames that follow are of; called once, before the first frame."""
+        ...
+
+    def on_frame(self, frame: TrackerFrame) -> None:
+        """Take a frame."""
         ...
 
 

@@ -10,8 +10,9 @@ from serial.tools import list_ports
 
 from harness.core.arrays import Floats
 from harness.errors import HarnessError
-from harness.stream.is900 import DriverConfig, EmulatorConfig, open_tracker, serve_emulator
-from harness.stream.is900.codec import DeviceSamples
+from harness.stream.is900 import DriverConfig, open_tracker, serve_emulator
+from harness.stream.polhemus import EmulatorConfig
+from harness.stream.polhemus.codec import DeviceSamples
 
 _STATIONS = ("head", "torso", "left_hand", "right_hand")
 _RATE_HZ, _LOOP_S, _FRAMES = 20.0, 4.0, 20

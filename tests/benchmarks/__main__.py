@@ -10,11 +10,13 @@ from harness.results.findings import BenchmarkStatement
 from tests.benchmarks.leak_check import bench_leak_check
 from tests.benchmarks.live_viewer import bench_live_viewer
 from tests.benchmarks.load import bench_load
+from tests.benchmarks.pose_files import bench_pose_files
 from tests.benchmarks.serve import bench_serve
 
 BENCHMARKS: dict[str, Callable[[int, int], list[BenchmarkStatement]]] = {
     "leak": lambda seed, runs: bench_leak_check(seed),
     "load": lambda seed, runs: bench_load(seed),
+    "poses": lambda seed, runs: bench_pose_files(seed),
     "serve": lambda seed, runs: bench_serve(seed, runs=runs),
     "view": lambda seed, runs: bench_live_viewer(seed, runs=runs),
 }

@@ -24,7 +24,7 @@ from harness.core.arrays import Floats
 from harness.core.child_process import PythonProcess
 from harness.live import JitterProbe
 from harness.results.findings import BenchmarkStatement
-from harness.stream.is900.codec import BINARY, CENTIMETRES, STANDARD_LIST, STOP, STREAM, ZERO_CLOCK, station_command
+from harness.stream.polhemus.codec import BINARY, CENTIMETRES, STANDARD_LIST, STOP, STREAM, ZERO_CLOCK, station_command
 from harness.stream.recording import RECEIVED, read_recording
 
 STATIONS, RATE_HZ = 4, 75.0

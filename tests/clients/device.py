@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from harness.stream.is900 import EmulatorConfig, Fault, serve_emulator
-from harness.stream.is900.codec import DeviceSamples, from_yaw_pitch_roll_deg
+from harness.stream.is900 import serve_emulator
+from harness.stream.polhemus import EmulatorConfig, Fault
+from harness.stream.polhemus.codec import DeviceSamples, from_yaw_pitch_roll_deg
 
 RADIUS_M, LOOP_S, QUALITY = 0.3, 5.0, 214
 ROOT = Path(__file__).parents[2]

@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 import pytest
 
 from harness.commands.output import progress_note, recording_note
-from harness.stream.is900.codec import WireFormat
+from harness.stream.polhemus.codec import WireFormat
 from harness.stream.recording import RecordingStream, RecordingWriter, record_capture
 from tests.command import Command
 from tests.stream.wire import FOUR, device_bytes, in_chunks, stamps_s
@@ -65,7 +65,7 @@ def test_a_simulated_recording_that_is_stopped_in_the_middle_leaves_the_file_as_
 @pytest.mark.parametrize(
     ("name", "options"),
     [
-        ("recorder.open_tracker", []),
+        ("recorder.open_tracker_at", []),
         ("command_recording.detect_device", ["--send", "S"]),
         ("line_server.detect_device", ["--serve", "LINK"]),
     ],
@@ -103,7 +103,7 @@ def test_a_recording_is_good_from_its_first_record_on(
     def opened(port: str, config: object, *, observer: RecordingWriter, on_event: object) -> Iterator[_Device]:
         yield _Device(observer, records)
 
-    monkeypatch.setattr("harness.stream.recording.recorder.open_tracker", opened)
+    monkeypatch.setattr("harness.stream.recording.recorder.open_tracker_at", opened)
     said = command("record", "tcp://127.0.0.1:9", tmp_path / "a.rec", code=code)
     assert said.lines[-1] == ("pass" if records else "interrupted")
 

@@ -15,8 +15,7 @@ from harness.experiment import ClipEvaluation
 from harness.experiment.scenarios import Scenario, find_scenario, load_scenario
 from harness.mocap import open_motion_source
 from harness.reconstruct import make_method
-from harness.stream.is900 import EmulatorConfig, FaultKind, open_transport
-from harness.stream.is900.codec import DeviceSamples
+from harness.stream.polhemus import EmulatorConfig, FaultKind, LineEmulator, open_transport
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness
 
@@ -86,11 +85,11 @@ def test_stations_have_the_numbers_that_are_asked_for(monkeypatch: pytest.Monkey
     """A unit whose devices share receivers, with item 16 as two programs expect it."""
     played: list[tuple[tuple[str, ...], EmulatorConfig]] = []
 
-    def play(samples: DeviceSamples, config: EmulatorConfig, *_: object) -> dict[str, float]:
-        played.append((samples.stations, config))
+    def play(emulator: LineEmulator, *_: object) -> dict[str, float]:
+        played.append((emulator.device.samples.stations, emulator.config))
         return {}
 
-    monkeypatch.setattr("harness.stream.is900.emulator.server.play_samples", play)
+    monkeypatch.setattr("harness.stream.polhemus.emulator.server.play_emulator", play)
     words = ["emulate", "builtin_walking", "--tcp", "127.0.0.1:0", "--stylus-bytes", "2"]
     talk = command(*words, "--stations", "head=9,left_hand=2").err
     assert "stations 2 left_hand, 9 head\n" in talk

@@ -82,7 +82,7 @@ EMULATE = "emulate demo --tcp 127.0.0.1:0"
 def test_the_next_command_repeats_what_matters(
     words: str, following: str, run: Path, command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("harness.stream.is900.emulator.server.play_samples", lambda *_: {})
+    monkeypatch.setattr("harness.stream.polhemus.emulator.server.play_emulator", lambda *_: {})
     said = command(*(run if word == "RUN" else word for word in words.split())).err
     (line,) = [line for line in said.splitlines() if line.startswith("next")]
     named = {"RUN": str(run), "PORT": said.partition("an IS-900 at ")[2].partition(",")[0]}

@@ -107,7 +107,7 @@ def test_a_recording_of_an_unknown_room_shows_its_stations(
         (["{tmp}"], "no results of the harness; expected a run"),
         (["{text}"], "no recording; expected a recording"),
         (["{empty}"], "an empty file"),
-        (["{markers}"], "which holds markers"),
+        (["{markers}"], "an empty file; expected a C3D marker file"),
         (["walking_p1_01", "--methods", "ik"], "A clip has no estimates"),
         (["walking_p1_01", "--scenario", "demo"], "A clip takes no --scenario"),
         (["{run}", "--methods", "pca"], "no method of this run called 'pca'. Known: ik, map, far."),

@@ -11,7 +11,7 @@ from harness.body import build_body
 from harness.core.network import resolve_host
 from harness.errors import BadInput
 from harness.live import VmcOutput
-from harness.stream.is900 import TcpPort, UdpPort, open_transport
+from harness.stream.polhemus import TcpPort, UdpPort, open_transport
 from tests.live.posing import configuration, live_pose
 
 IPV4, IPV6 = socket.AF_INET, socket.AF_INET6

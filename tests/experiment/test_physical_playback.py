@@ -7,7 +7,7 @@ import pytest
 
 from harness.errors import UnknownName
 from harness.experiment.playback import Playback, prepare_playback
-from harness.stream.is900.codec import DeviceSamples, RecordValues, WireFormat, encode_records
+from harness.stream.polhemus.codec import DeviceSamples, RecordValues, WireFormat, encode_records
 
 SCENARIO = """
 methods = ["ik:previous"]

@@ -16,7 +16,16 @@ from harness.experiment.playback import Playback, prepare_playback
 from harness.experiment.recorded_takes import find_playback, frame_numbers, recorded_take
 from harness.experiment.scenarios.scenario_reader import find_scenario
 from harness.stream.is900 import Device
-from harness.stream.is900.codec import BINARY, CENTIMETRES, STOP, STREAM, ZERO_CLOCK, WireFormat, station_command
+from harness.stream.polhemus.codec import (
+    BINARY,
+    CENTIMETRES,
+    STANDARD_LIST,
+    STOP,
+    STREAM,
+    ZERO_CLOCK,
+    WireFormat,
+    station_command,
+)
 from harness.stream.recording import RecordingStream, RecordingWriter, record_capture
 from tests.stream.wire import frames_equal
 
@@ -42,9 +51,15 @@ def simulated(played: Playback, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return path
 
 
-def emulated(played: Playback, path: Path, turns_s: Sequence[float], names: Sequence[str] = ()) -> Path:
+def emulated(
+    played: Playback,
+    path: Path,
+    turns_s: Sequence[float],
+    names: Sequence[str] = (),
+    items: tuple[int, ...] = STANDARD_LIST,
+) -> Path:
     """What a device says that is set up anew before each of these stretches of time, looked at every 10 ms."""
-    wire = WireFormat(tuple(names) or played.samples.stations, played.tracker.rate_hz)
+    wire = WireFormat(tuple(names) or played.samples.stations, played.tracker.rate_hz, items)
     device, now_s = Device(played.samples), 0.0
     with RecordingWriter(path) as writer:
         for turn_s in turns_s:
@@ -169,6 +184,13 @@ def test_another_motion_is_refused(other: dict[str, str], simulated: Path) -> No
     stream = RecordingStream(simulated)
     with pytest.raises(BadInput, match=r"of another motion: .* frames belong to this one"):
         score_methods(stream, find_playback(stream, scenario="demo", **other), ["ik:previous"])  # type: ignore[arg-type]
+
+
+def test_records_without_time_stamps_are_refused(played: Playback, tmp_path: Path) -> None:
+    """As those of a FASTRAK."""
+    stream = RecordingStream(emulated(played, tmp_path / "a.rec", [1.0], items=(40, 2, 11, 1)))
+    with pytest.raises(BadInput, match=r"no time stamps, so that no frame can be found .*`harness validate`"):
+        score_methods(stream, played, ["ik:previous"])
 
 
 def test_names_that_do_not_exist_are_refused(played: Playback, simulated: Path, tmp_path: Path) -> None:

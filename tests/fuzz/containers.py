@@ -16,7 +16,7 @@ from harness.stream.recording import CONFIGURED, FILE_HEADER, RECEIVED, Recordin
 from tests.fuzz.changes import BYTES, Change, change_json, json_value
 
 _SHAPES = ("(10**12,)", "(1000000000000,)", "(-1, 3)", "(2, 3", "(0,)", "()", "(3,)", "(True,)", "(" * 3000, "9" * 5000)
-_KINDS = ("conf", "evnt", "note", "recv", "sent", "\xff\0\0\0")
+_KINDS = ("conf", "evnt", "note", "recv", "sent", "body", "pose", "mark", "\xff\0\0\0")
 _TYPES = ("<f8", "|O", "<U9", "<c16", "|b1", "<f2", "|V8", ">f8", "<M8[s]", "", "x", "<f8'*9", "<i8", "<U99999999999")
 
 
@@ -83,15 +83,16 @@ def _npy(array: np.ndarray[Any, Any]) -> bytes:
 
 def change_recording(data: bytes, rng: random.Random) -> bytes:
     """Other payloads, times, kinds and orders of blocks whose checksums are right."""
+    header = data[: len(FILE_HEADER)] if data.startswith(FILE_HEADER[:8]) else FILE_HEADER
     blocks = [block for block in read_blocks(data) if isinstance(block, RecordingBlock)]
     for _ in range(rng.choice((1, 1, 2, 5))):
         here = rng.randrange(len(blocks)) if rng.random() < 0.5 else rng.choice(_few_by_kind(blocks))
         blocks[here : here + 1] = _change_block(blocks[here], rng)
         if not blocks:
-            return FILE_HEADER
+            return header
     if rng.random() < 0.1:
         rng.shuffle(blocks)
-    return FILE_HEADER + b"".join(map(encode_block, blocks))
+    return header + b"".join(map(encode_block, blocks))
 
 
 def _few_by_kind(blocks: list[RecordingBlock]) -> list[int]:

@@ -35,9 +35,16 @@ from harness.report.sweep.page import sweep_text, write_sweep_page
 from harness.results import INDEX_FILE, load_run, read_summary
 from harness.results.findings import read_findings, read_placement
 from harness.simulate.physics import read_mcf
-from harness.stream import LineEvent, StreamSummary, format_csv_row, frame_rows
-from harness.stream.is900 import DEFAULT_EMITTERS
-from harness.stream.recording import RecordingStream, RecordingWriter, record_capture
+from harness.stream import LineEvent, PoseFileOptions, StreamSummary, format_csv_row, frame_rows, measure_sampling
+from harness.stream.polhemus import DEFAULT_EMITTERS
+from harness.stream.recording import (
+    PoseLogStream,
+    RecordingStream,
+    RecordingWriter,
+    open_poses,
+    record_capture,
+    write_pose_recording,
+)
 from harness.study.placement.config import base_scenario, load_placement_study
 from harness.study.placement.placement_study import run_placement
 from tests.fuzz.changes import BYTES, JSON, TEXT, TOML, Change
@@ -49,6 +56,7 @@ from tests.mocap.test_fuzz import _c3d
 from tests.planted import MeansPlan, Plan, planted_run, planted_sweep
 from tests.reconstruct.database.test_motion_database import make_take
 from tests.report.paper import findings as paper_findings
+from tests.stream.poses import pose_files
 
 OPTIONS = "dynamic_map[neighbours=40|60]+ik, local_pca[neighbours=100], kernel_cca[jump_m=0.5,outputs=angles]+ik"
 
@@ -186,6 +194,26 @@ def _read_recording(folder: Path) -> object:
     return str(summary), summary.as_dict(), recording.damage, recording.note, stream.counts, lines, playback.scenario
 
 
+def _read_poses(name: str) -> Callable[[Path], object]:
+    def read(folder: Path) -> object:
+        found = open_poses([folder / name], None if name.endswith(".rec") else PoseFileOptions(untimed=True))
+        frames = sum(1 for _ in PoseLogStream(found.log))
+        sampling = [measure_sampling(body) for body in found.log.bodies]
+        return frames, sampling, [str(finding) for finding in found.log.findings], found.marks, found.damage
+
+    return read
+
+
+def _make_pose_recording(folder: Path) -> None:
+    path = pose_files.write(folder / "x.csv", pose_files.motive())
+    write_pose_recording(folder / "x.rec", open_poses([path]).log, {"plan": "ab"}, [(1.0, "static")])
+    path.unlink()
+
+
+def _pose_kind(name: str, content: str | bytes) -> Kind:
+    return Kind(f"poses {name}", _write("x.csv", content), ("*",), TEXT, _read_poses("x.csv"), "inspect {}/x.csv")
+
+
 def _make_run(folder: Path) -> None:
     methods = {"ik": 1.5, "best_match": 3.0}
     planted_run(folder / "x", Plan(behaviours=("walking",), methods=methods, duration_s=1.5))
@@ -315,6 +343,11 @@ KINDS: dict[str, Kind] = {
         Kind("method options", _write("x.txt", OPTIONS), ("*",), TEXT, _read_options),
         Kind("calibration", _make_calibration, ("*",), TOML, _read_calibration, mend=mend_calibration),
         Kind("recording", _make_recording, ("*",), RECORDING, _read_recording, "replay {}/x.rec --frames"),
+        *(_pose_kind(name, pose_files.SAMPLES[name]) for name in ("tum", "euroc", "no names", "tabs", "quotes")),
+        *(_pose_kind(name, pose_files.UNTIMED[name]) for name in ("matrices", "kitti")),
+        _pose_kind("of optitrack", pose_files.motive(range(5))),
+        _pose_kind("of vicon", pose_files.vicon_tracker()),
+        Kind("pose recording", _make_pose_recording, ("*",), RECORDING, _read_poses("x.rec"), "inspect {}/x.rec"),
         Kind("cell", _make_run, ("x/cells/*/cell.json",), JSON, _read_run, _COMPARE, mend_run),
         Kind("frames of a cell", _make_run, ("x/cells/*/frames.npz",), NPZ, _read_run, _COMPARE, mend_run),
         Kind(

@@ -35,7 +35,7 @@ from harness.live.stated_uncertainty import bone_reach_m, describe_uncertainty
 from harness.live.viewer import _run_viewer_process
 from harness.simulate import simulate_tracker
 from harness.stream import TrackerFrame
-from harness.stream.is900.codec import WireFormat
+from harness.stream.polhemus.codec import WireFormat
 from harness.stream.recording import RecordingSwitch, read_recording
 from harness.view import COMMAND_HEADER
 from tests.live.posing import configuration, live_pose

@@ -21,7 +21,7 @@ from harness.live.pose import LivePose
 from harness.live.session import LiveOptions, run_session
 from harness.live.session_control import SessionControl, new_path
 from harness.stream import TrackerFrame
-from harness.stream.is900.codec import WireFormat
+from harness.stream.polhemus.codec import WireFormat
 from tests.live.posing import configuration, frame
 from tests.live.streams import Paced
 

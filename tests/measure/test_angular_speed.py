@@ -9,7 +9,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadInput
 from harness.measure.angular_speed import SpeedSeries, angular_speed, identify_stations, time_offset
-from harness.measure.pose_series import MeasuredPoses, TruthPoses
+from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
 
 PERIOD_S = 0.025
 
@@ -19,16 +19,37 @@ def series(rng: np.random.Generator, count: int) -> Floats:
     return out
 
 
-def test_angular_speed_of_steady_rotation() -> None:
-    time_s = 5.0 + PERIOD_S * np.arange(100.0)
-    turn = rotations.exp(np.array([0.0, 0.0, 3.0]) * time_s[:, None])
-    valid = np.arange(100) != 50
-    found = angular_speed(time_s, turn, valid, PERIOD_S)
-    assert found.begin_s == pytest.approx(5.0 + 0.5 * PERIOD_S)
-    np.testing.assert_array_equal(np.flatnonzero(np.isnan(found.rad_s)), [49, 50])
-    np.testing.assert_allclose(found.rad_s[np.isfinite(found.rad_s)], 3.0)
+def test_angular_speed_of_steady_rotation_at_uneven_times(rng: np.random.Generator) -> None:
+    """Steps from 10 to 60 ms, and one gap, around which nothing is known for the span of a speed."""
+    time_s = 5.0 + np.cumsum(rng.uniform(0.01, 0.06, 300))
+    time_s[150:] += 1.0
+    turn = rotations.exp(np.array([0.0, 0.0, 3.0]) * time_s[:, None]) * rng.choice([-1.0, 1.0], 300)[:, None]
+    found = angular_speed(TruthSpline(TruthPoses(time_s, np.zeros((300, 3)), turn)), PERIOD_S, 0.1)
+    assert found.begin_s == pytest.approx(time_s[0] + 0.05)
+    known = np.isfinite(found.rad_s)
+    np.testing.assert_allclose(found.rad_s[known], 3.0, rtol=1e-3)
+    unknown_s = found.begin_s + PERIOD_S * np.flatnonzero(~known)
+    assert unknown_s.min() == pytest.approx(time_s[149] - 0.05, abs=PERIOD_S)
+    assert unknown_s.max() == pytest.approx(time_s[150] + 0.05, abs=PERIOD_S)
+    unstamped = MeasuredPoses(np.full(3, np.nan), np.zeros((3, 3)), turn[:3], np.ones(3, bool))
     with pytest.raises(BadInput, match="No pose has a time"):
-        angular_speed(np.full(3, np.nan), turn[:3], np.ones(3, bool), PERIOD_S)
+        unstamped.orientations()
+
+
+def test_speeds_over_a_span_find_the_offset_of_a_noisy_camera(rng: np.random.Generator) -> None:
+    """Noise of 1 deg on 100 poses a second hides the speed from one pose to the next, not that over a span."""
+    time_s = np.arange(3000) / 100.0
+    turn = rotations.multiply(turning("a", time_s), rotations.exp(np.deg2rad(1.0) * rng.normal(size=(3000, 3))))
+    noisy, exact = (
+        TruthSpline(TruthPoses(time_s + s, np.zeros((3000, 3)), q))
+        for s, q in ((2.0, turn), (0.0, turning("a", time_s)))
+    )
+    single, over = (
+        time_offset([angular_speed(noisy, 0.01, span_s)], [angular_speed(exact, 0.01, span_s)])
+        for span_s in (0.01, 0.2)
+    )
+    assert single.correlation < 0.5 < 0.9 < over.correlation
+    assert over.offset_s == pytest.approx(2.0, abs=0.01)
 
 
 @pytest.mark.parametrize("shift", [-700, -3, 0, 12, 900])

@@ -11,7 +11,7 @@ from harness.core.number_format import Interval
 from harness.core.seeds import generator
 from harness.measure.timing import TIMING_KEYS, TimingAccumulator, TimingMeasurement, count_share, robust_slope
 from harness.simulate import Clock, Noise, gauss_markov, noise_preset
-from harness.stream.is900.codec import WireFormat
+from harness.stream.polhemus.codec import WireFormat
 from harness.stream.recording import CaptureBlock, StationReadings
 from tests.measure.resting_stations import simulate_static, station_readings
 

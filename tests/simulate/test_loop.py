@@ -12,7 +12,7 @@ from harness.simulate.loop import loop_trajectory, simulate_loop
 from harness.simulate.noise import noise_preset
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.is900 import Device
-from harness.stream.is900.codec import SHORT_LIST, ByteCapture, FrameReader
+from harness.stream.polhemus.codec import SHORT_LIST, ByteCapture, FrameReader
 from tests.simulate.conftest import worn
 
 TRACKER = TrackerConfig(slot_s=0.0033)

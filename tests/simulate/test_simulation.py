@@ -21,7 +21,7 @@ from harness.simulate.noise import NOISE_PRESETS, Noise, noise_preset
 from harness.simulate.simulation import Simulation, sampling_times_s, simulate_tracker
 from harness.simulate.trajectory import Trajectory
 from harness.stream import TrackerFrame
-from harness.stream.is900.codec import ByteCapture, CaptureStream, FrameReader
+from harness.stream.polhemus.codec import ByteCapture, CaptureStream, FrameReader
 from harness.testing.stream_checks import check_stream
 from tests.simulate.conftest import worn
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.stream.is900.codec.decoder import Decoder, DecoderEvent, RecordRun
-from harness.stream.is900.codec.items import STANDARD_LIST, STATION_CHARACTERS, record_size
-from harness.stream.is900.codec.reader import ByteCapture, FrameReader, WireFormat
-from harness.stream.is900.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
+from harness.stream.polhemus.codec.decoder import Decoder, DecoderEvent, RecordRun
+from harness.stream.polhemus.codec.items import STANDARD_LIST, STATION_CHARACTERS, record_size
+from harness.stream.polhemus.codec.reader import ByteCapture, FrameReader, WireFormat
+from harness.stream.polhemus.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
 
 Kind = Literal["flipped", "changed", "lost", "added"]
 KINDS: tuple[Kind, ...] = ("flipped", "changed", "lost", "added")

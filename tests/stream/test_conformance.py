@@ -10,10 +10,10 @@ import pytest
 
 from harness.experiment import Playback, prepare_playback
 from harness.reconstruct import list_methods, make_method
-from harness.stream.is900.codec.reader import ByteCapture, WireFormat
-from harness.stream.is900.codec.records import RecordValues, encode_records
 from harness.stream.is900.driver.is900 import Is900
-from harness.stream.is900.emulator.server import serve_emulator
+from harness.stream.is900.emulator.emulator import serve_emulator
+from harness.stream.polhemus.codec.reader import ByteCapture, WireFormat
+from harness.stream.polhemus.codec.records import RecordValues, encode_records
 from harness.stream.recording.recording import RecordingWriter
 from harness.stream.recording.replay import RecordingStream
 from harness.testing.stream_checks import check_stream

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from harness.stream.is900.codec.decoder import LONGEST_REPLY, DecoderEvent, Garbage, RecordRun, merge_adjacent
+from harness.stream.polhemus.codec.decoder import LONGEST_REPLY, DecoderEvent, Garbage, RecordRun, merge_adjacent
 from tests.stream.damage import (
     FATES,
     KINDS,

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from harness.core.arrays import Floats
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.items import STANDARD_LIST, STATION_CHARACTERS, record_size
-from harness.stream.is900.codec.reader import ByteCapture, FrameReader, WireFormat
-from harness.stream.is900.codec.records import RecordFormat, RecordValues, encode_records
+from harness.stream.polhemus.codec.items import STANDARD_LIST, STATION_CHARACTERS, record_size
+from harness.stream.polhemus.codec.reader import ByteCapture, FrameReader, WireFormat
+from harness.stream.polhemus.codec.records import RecordFormat, RecordValues, encode_records
 
 RATE_HZ, SLOT_S = 40.0, 0.0033
 RECORD = record_size(STANDARD_LIST)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from serial.tools import list_ports
 
-from harness.stream.is900 import EmulatorConfig
+from harness.stream.polhemus import EmulatorConfig
 from harness.testing import device_checks
 from harness.testing.device_checks import check_emulated_device, describe_serial_ports
 

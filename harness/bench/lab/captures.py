@@ -29,8 +29,8 @@ from harness.simulate import (
     simulate_readings,
     transmit_readings,
 )
-from harness.stream.is900 import Fault, add_byte_faults
-from harness.stream.is900.codec import ByteCapture, WireFormat
+from harness.stream.polhemus import Fault, add_byte_faults
+from harness.stream.polhemus.codec import ByteCapture, WireFormat
 from harness.stream.recording import record_capture
 
 SCENARIO = "lab"

@@ -18,7 +18,7 @@ from harness.experiment.scenarios import Scenario, load_scenario
 from harness.mocap.synthetic import generate_rig
 from harness.results.findings import BenchmarkStatement
 from harness.simulate import Trajectory, sampling_times_s, simulate_readings, transmit_readings
-from harness.stream.is900.codec import ByteCapture, WireFormat
+from harness.stream.polhemus.codec import ByteCapture, WireFormat
 from harness.stream.recording import RecordingWriter, record_capture
 from harness.study.trust.trust_study import run_trust_study
 

@@ -24,7 +24,7 @@ from harness.mocap import synthetic
 from harness.results.findings import BenchmarkStatement
 from harness.simulate import Clock, Noise, Simulation, TrackerConfig, noise_preset, simulate_tracker
 from harness.simulate.physics import PhysicalTracker, Physics
-from harness.stream.is900.codec import BITS_PER_BYTE, STANDARD_LIST, record_size
+from harness.stream.polhemus.codec import BITS_PER_BYTE, STANDARD_LIST, record_size
 
 MOUNTS = (
     *common.MOUNTS,

@@ -17,7 +17,7 @@ from harness.errors import BadInput
 from harness.experiment.scenarios.scenario_motion import ScenarioMotion
 from harness.simulate import Disturbance, Noise, TrackerConfig, noise_preset
 from harness.simulate.physics import ConstellationSettings, Physics
-from harness.stream.is900 import Fault
+from harness.stream.polhemus import Fault
 
 SCHEMA = 1
 MOST_VARIANTS = 1_000_000

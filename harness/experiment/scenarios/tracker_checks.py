@@ -6,7 +6,7 @@ from harness.errors import UnknownName
 from harness.experiment.scenarios.scenario import Scenario
 from harness.simulate.physics import check_emitters, load_constellation
 from harness.stream import make_inputs
-from harness.stream.is900.codec import WireFormat
+from harness.stream.polhemus.codec import WireFormat
 
 
 def check_trackers(scenario: Scenario) -> None:

@@ -25,6 +25,7 @@ from harness.measure.reports.departures import Departure
 from harness.measure.rest_statistics import drift_speed, mean_drift, rest_distance
 from harness.measure.rigid_pair import RigidPair
 from harness.measure.static_series import StaticSeries
+from harness.measure.surveyed_points import SurveyComparison
 from harness.measure.unit_file import UnitFile
 
 PRECISION = 0.2
@@ -221,12 +222,19 @@ class UnitReport:
     advice: tuple[RecordingAdvice, ...] = ()
     rigid_pairs: tuple[RigidPair, ...] = ()
     """Pairs of stations on one bar; empty without any."""
+    survey: SurveyComparison | None = None
+    """Rests against surveyed points."""
     notes: tuple[str, ...] = ()
     """What cannot be told from this capture and what to know about it, a sentence each."""
 
 
 def make_unit_report(
-    profile: UnitProfile, unit: UnitFile, checks: Sequence[Departure], expected_from: str, defaults: Mapping[str, float]
+    profile: UnitProfile,
+    unit: UnitFile,
+    checks: Sequence[Departure],
+    expected_from: str,
+    defaults: Mapping[str, float],
+    survey: SurveyComparison | None = None,
 ) -> UnitReport:
     """The report on a profile whose unit file is `unit`; `defaults` are the preset's values of its keys."""
     parameters = {**profile.parameters, **profile.episodes.means}
@@ -258,13 +266,14 @@ def make_unit_report(
         stations=tuple(StationFigures(station, _figures(profile, station)) for station in profile.stations),
         allan_position=_allan(profile.episodes.found, "position_m"),
         allan_orientation=_allan(profile.episodes.found, "rotation_rad"),
-        allan_position_model=_allan_model(profile.noise.all_stations, profile.rate_hz, 0, (1, 1, 1)),
-        allan_orientation_model=_allan_model(profile.noise.all_stations, profile.rate_hz, 2, (3, 3, 4)),
+        allan_position_model=_allan_model(profile.noise.all_stations, profile.even_rate_hz, 0, (1, 1, 1)),
+        allan_orientation_model=_allan_model(profile.noise.all_stations, profile.even_rate_hz, 2, (3, 3, 4)),
         spectra=_spectra(profile.rest),
         episodes=_episodes(profile),
         quality=profile.quality,
         advice=_advice(profile),
         rigid_pairs=(profile.rigid,) if profile.rigid else (),
+        survey=survey,
         notes=profile.limits,
     )
 
@@ -341,7 +350,7 @@ def _allan_model(
 def _episodes(profile: UnitProfile) -> tuple[EpisodeMark, ...]:
     """All episodes at rest, by the time since the first rest began."""
     marks = []
-    begin_s = min(one.begin_s for one in profile.rest)
+    begin_s = min((one.begin_s for one in profile.rest), default=0.0)
     for one in profile.episodes.found:
         since_s, rate_hz, station = one.series.begin_s - begin_s, one.series.rate_hz, one.series.station
         for event in one.excursions:

@@ -148,14 +148,14 @@ def residual_series(registration: Registration) -> tuple[ResidualSeries, ...]:
 
 
 def error_quantiles(error: Floats, valid: Bools, period_s: float) -> ErrorQuantiles:
-    """Summarise errors (N, 3) at records `period_s` apart; `valid` (N,) are those that were measured.
+    """Summarise errors (N, 3) on a grid of `period_s`; `valid` (N,) are those that were measured.
 
     Intervals are percentiles of a bootstrap over blocks of five seconds (Kunsch 1989, Ann. Statist. 17).
     """
     size = np.linalg.norm(error, axis=1)
     length = max(round(_BLOCK_S / period_s), 1)
     blocks = [size[at : at + length][valid[at : at + length]] for at in range(0, len(size), length)]
-    blocks = [block for block in blocks if len(block) >= length // 2]
+    blocks = [block for block in blocks if len(block) >= valid.mean() * length / 2.0]
     if len(blocks) < _FEWEST_BLOCKS:
         missing = Interval.missing(f"{_FEWEST_BLOCKS * _BLOCK_S:g} s of readings are needed.")
         return ErrorQuantiles(missing, missing, missing)

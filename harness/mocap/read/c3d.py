@@ -15,11 +15,10 @@ from harness.core.arrays import Floats, freeze
 from harness.core.input_file import read_input_file
 from harness.core.motion import Clip
 from harness.core.skeleton import forward_kinematics
+from harness.core.units import LENGTH_UNITS_M, find_unit
 from harness.errors import BadFile
 from harness.mocap.read.c3d_header import FETCH_AGAIN, FORMAT, C3dHeader, count_frames, read_header
 from harness.mocap.read.file_checks import LIMIT_BYTES, MAX_VALUE, check_size
-
-UNITS_M = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
 
 _RESIDUALS = 256.0
 """The low byte of the fourth value of a marker is its residual, the high byte the cameras that saw it."""
@@ -161,7 +160,8 @@ def _length_unit(path: Path, units: tuple[str, ...], given_m: float | None) -> t
     """Unit of length [m] and the evidence; BadFile if neither the file nor the caller gives one."""
     if given_m is not None:
         return given_m, "unit as given"
-    if not units or units[0].lower() not in UNITS_M:
+    name = find_unit(units[0], LENGTH_UNITS_M) if units else ""
+    if not name:
         found = f"POINT:UNITS {units[0]!r}" if units else "no POINT:UNITS"
-        raise BadFile(path, found, f"one of {', '.join(UNITS_M)}", "Give the unit's length in metres (--unit).")
-    return UNITS_M[units[0].lower()], f"{units[0]}, from POINT:UNITS"
+        raise BadFile(path, found, f"one of {', '.join(LENGTH_UNITS_M)}", "Name the unit with --unit.")
+    return LENGTH_UNITS_M[name], f"{units[0]}, from POINT:UNITS"

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from harness.core.number_format import NOT_MEASURED, Interval, count_noun, format_fixed, format_share
-from harness.measure import QualityClass, RigidPair, StretchLength
+from harness.measure import QualityClass, RigidPair, StretchLength, SurveyComparison, UncertaintyBudget
 from harness.measure.reports import (
     STATION_FIGURES,
     CaptureSummary,
@@ -49,13 +49,15 @@ def unit_page(report: UnitReport, command: str, unit_file: str = "") -> Page:
     return Page(
         verb="characterize",
         name=report.name,
-        headline=departures_sentence(report.name, report.checks, report.expected_from),
+        headline=departures_sentence(report.name, report.checks, report.expected_from)
+        if report.expected_from
+        else f"{capture_text(report.capture)}.",
         lead=[Bullets(departure_texts(report.checks)), *([Prose(described)] if described else [])],
         facts={
             "Capture": capture_text(report.capture),
             "Damage": " ".join(report.capture.damage),
             "Unit file": unit_file,
-            "Expected": f"numbers of {report.expected_from}",
+            "Expected": f"numbers of {report.expected_from}" if report.expected_from else "",
         },
         sections=[
             Section(
@@ -98,6 +100,7 @@ def unit_page(report: UnitReport, command: str, unit_file: str = "") -> Page:
                 "bar",
                 [Drawing(partial(pair_chart, pair), _pair_table(pair)) for pair in report.rigid_pairs],
             ),
+            Section("Surveyed points", "survey", [_survey_table(report.survey)] if report.survey else []),
             Section("How long to record", "advice", [Bullets([advice_text(one) for one in report.advice])]),
             Section(
                 "Capture",
@@ -343,9 +346,31 @@ def _millimetres(value_m: float) -> str:
     return format_fixed(1e3 * value_m, 1) if np.isfinite(value_m) else NOT_MEASURED
 
 
+def _survey_table(survey: SurveyComparison) -> DataTable:
+    """What a station at rest errs by at surveyed points."""
+    numbers: dict[str, object] = {
+        f"point {number}: error x, y, z": f"{', '.join(format_fixed(1e3 * value, 2) for value in error)} mm"
+        for number, error in enumerate(survey.errors_m.tolist(), 1)
+    }
+    numbers |= {"distance (RMS)": survey.rms_m.scaled(1e3, "mm"), "scale error": survey.scale.scaled(1e2, "%")}
+    numbers |= budget_rows(survey.budget)
+    caption = "Errors after the best rigid placement of the points, which takes out origin and axes."
+    return DataTable([survey.station, "measured"], [*map(list, numbers.items())], caption=caption, label="survey")
+
+
+def budget_rows(budget: UncertaintyBudget) -> dict[str, object]:
+    """An uncertainty budget in millimetres: standard uncertainties, bias, and expanded uncertainty."""
+    rows: dict[str, object] = {
+        f"{one.name} (type {one.kind})": f"{_significant(1e3 * one.standard)} mm" for one in budget.components
+    }
+    rows["bias"] = budget.bias.scaled(1e3, "mm") if budget.bias.is_measured else NOT_MEASURED
+    label = f"expanded uncertainty of one reading (k = {budget.coverage_factor:.2f})"
+    return {**rows, label: f"{_significant(1e3 * budget.expanded)} mm"}
+
+
 def _pair_table(pair: RigidPair) -> DataTable:
     """What two stations on one bar show."""
-    numbers = {
+    numbers: dict[str, object] = {
         "distance of the stations": find_quantity("length_m").of(pair.length_m),
         "change of the angle between them (RMS)": find_quantity("rotation_rad").of(pair.rotation_rad),
         "positions ahead of orientations": find_quantity("components.speed.ahead_s").of(pair.ahead_s),
@@ -354,6 +379,11 @@ def _pair_table(pair: RigidPair) -> DataTable:
         f"error at {one.from_m_s:g} to {one.to_m_s:g} m/s (RMS)": find_quantity("rms_m").of(one.rms_m)
         for one in pair.speeds
     }
+    numbers |= {
+        f"length at {one.from_m:.2g} to {one.to_m:.2g} m from the origin": find_quantity("length_m").of(one.length_m)
+        for one in pair.places
+    }
+    numbers |= budget_rows(pair.budget)
     caption = "Errors of both stations together. Below the numbers: 95 % intervals."
     names = " and ".join(pair.stations)
     return DataTable([names, "measured"], [*map(list, numbers.items())], caption=caption, label=f"bar of {names}")

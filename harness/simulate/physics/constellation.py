@@ -13,7 +13,7 @@ from harness.core.ranges import Range, Text, check_fields
 from harness.core.seeds import generator
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.simulate.physics.emitters import MCF_SUFFIX, find_emitter_fault, read_mcf
-from harness.stream.is900.codec import Emitter
+from harness.stream.polhemus.codec import Emitter
 
 _UNIT_TOLERANCE = 1e-9
 

@@ -14,7 +14,7 @@ import numpy as np
 from harness.core.files import write_bytes
 from harness.core.input_file import MEGABYTE, read_input_file
 from harness.errors import BadFile, shorten
-from harness.stream.is900.codec import Emitter, parse_reply
+from harness.stream.polhemus.codec import Emitter, parse_reply
 
 FEWEST, MOST = 3, 200
 """Numbers of emitters of a constellation. A position needs three ranges; no known constellation has 200."""

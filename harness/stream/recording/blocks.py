@@ -13,7 +13,8 @@ A file is a header and then blocks; all numbers are little-endian:
              L bytes  payload
              u32      CRC-32 of the block before this field
 
-Every version begins with these 16 bytes of header. Readers skip blocks of a kind that they do not know.
+Every version begins with these 16 bytes of header. Readers skip blocks of a kind that they do not know. Version 1 holds
+the bytes of a device's line. Version 2 holds poses instead, and readers that know version 1 alone refuse it.
 """
 
 import io
@@ -24,7 +25,7 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 MAGIC = b"\x89IS900\r\n"
-VERSION = 1
+VERSION, POSES_VERSION = 1, 2
 BLOCK_MARKER = b"\x90BLK"
 MAX_PAYLOAD_BYTES = 1 << 16
 """Longest payload [bytes]; it exposes a damaged length field."""
@@ -34,6 +35,8 @@ RECEIVED, SENT = "recv", "sent"
 CONFIGURED, EVENT, NOTE, ANSWERED, MARK = "conf", "evnt", "note", "answ", "mark"
 """JSON: the format of the bytes that follow, an event on the line, the origin of the recording, a command with its
 decoded answer, the stretch of a capture that begins."""
+BODIES, POSES = "body", "pose"
+"""JSON of the bodies of poses and of what was concluded about their source; rows of poses (see `pose_recording.py`)."""
 
 _CRC = struct.Struct("<I")
 _VERSION = struct.Struct("<8sI")
@@ -65,6 +68,7 @@ def _append_crc(content: bytes) -> bytes:
 
 
 FILE_HEADER = _append_crc(_VERSION.pack(MAGIC, VERSION))
+POSES_HEADER = _append_crc(_VERSION.pack(MAGIC, POSES_VERSION))
 
 
 def encode_block(block: RecordingBlock) -> bytes:

@@ -7,10 +7,10 @@ from contextlib import suppress
 from typing import Any
 
 from harness.errors import BadInput
-from harness.stream.is900.codec.commands import find_danger, parse_command
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.is900.driver.config import DriverConfig, DriverTiming
-from harness.stream.is900.driver.connection import (
+from harness.stream.polhemus.codec.commands import find_danger, parse_command
+from harness.stream.polhemus.codec.reader import WireFormat
+from harness.stream.polhemus.driver.config import DriverTiming, LineConfig
+from harness.stream.polhemus.driver.connection import (
     WAKE_UP,
     DeviceConnection,
     Host,
@@ -18,8 +18,8 @@ from harness.stream.is900.driver.connection import (
     candidate_baud_rates,
     detect_device,
 )
-from harness.stream.is900.driver.exchange import Answer, exchange, read_wire_format
-from harness.stream.is900.driver.transport import LineLost
+from harness.stream.polhemus.driver.exchange import Answer, exchange, read_wire_format
+from harness.stream.polhemus.driver.transport import LineLost
 from harness.stream.recording.blocks import RECEIVED
 from harness.stream.recording.recorder import PROGRESS_INTERVAL_S
 from harness.stream.recording.recording import RecordingWriter
@@ -77,7 +77,7 @@ def check_commands(texts: Sequence[str], allowed: bool) -> None:
 def record_commands(
     port: str,
     texts: Sequence[str],
-    config: DriverConfig,
+    config: LineConfig,
     writer: RecordingWriter,
     *,
     seconds: float | None = None,
@@ -90,7 +90,7 @@ def record_commands(
 
     The device is stopped before the first command and after the last. A device that streams at the end is
     recorded until Ctrl-C; `seconds` [s] limits that, and otherwise waits for late answers. Of `config`, the baud rate
-    and the rate count. Raises BadInput when no IS-900 answers.
+    and the rate count. Raises BadInput when no device answers.
     """
     used_timing, used_host = timing or DriverTiming(), host or Host()
 
@@ -107,7 +107,7 @@ def record_commands(
             wire: WireFormat | None = None
             for text in texts:
                 if text in (STREAM, POLL) and not streaming:
-                    wire = _announce_format(line, writer, config.rate_hz, log)
+                    wire = _announce_format(line, writer, config, log)
                 streaming = text == STREAM or (streaming and text != STOP)
                 answer = exchange(line, text, wire)
                 exchanges.append(answer)
@@ -124,11 +124,11 @@ def record_commands(
 
 
 def _announce_format(
-    line: DeviceConnection, writer: RecordingWriter, rate_hz: float | None, log: Callable[[str], None]
+    line: DeviceConnection, writer: RecordingWriter, config: LineConfig, log: Callable[[str], None]
 ) -> WireFormat | None:
     """Write the format of the records that follow, so that `harness replay` decodes them."""
     try:
-        wire = read_wire_format(line, rate_hz)
+        wire = read_wire_format(line, config.rate_hz, config.family)
     except BadInput as error:
         log(f"{error} Every byte is recorded, but no frames can be replayed.")
         return None

@@ -18,12 +18,12 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadFile
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.driver.config import DriverConfig
-from harness.stream.is900.driver.is900 import open_tracker
-from harness.stream.is900.driver.tracker import Tracker
 from harness.stream.line_events import EventCounter
+from harness.stream.ports import TrackerConfig, open_tracker_at
+from harness.stream.recording.pose_writer import open_writer, read_stretch_marks
 from harness.stream.recording.recorder import tracked_text
-from harness.stream.recording.recording import RecordingWriter, read_marks
+from harness.stream.recording.recording import RecordingWriter
+from harness.stream.tracker import OpenTracker
 
 WATCHED_S = 2.0
 """Time over which the stations are watched for rest and motion [s]."""
@@ -52,14 +52,14 @@ def finished_stretches(path: Path) -> set[str]:
         return set()
     return {
         str(begin["stretch"])
-        for begin, end in pairwise(read_marks(path))
+        for begin, end in pairwise(read_stretch_marks(path))
         if begin.get("stretch") and end.get("stretch") == "" and end.get("finished") == begin["stretch"]
     }
 
 
 def capture_stretches(
     port: str,
-    config: DriverConfig,
+    config: TrackerConfig,
     path: Path,
     stretches: Sequence[Stretch],
     note: dict[str, object],
@@ -83,8 +83,8 @@ def capture_stretches(
         return
     events = EventCounter(log)
     with (
-        RecordingWriter(path, note) as writer,
-        open_tracker(port, config, observer=writer, on_event=events) as device,
+        open_writer(path, note, config) as writer,
+        open_tracker_at(port, config, observer=writer, on_event=events) as device,
         closing(_frames(device, path)) as frames,
     ):
         log(f"{device.identification or 'a device'} at {port}; stations {device.station_list}")
@@ -94,7 +94,7 @@ def capture_stretches(
         progress("")
 
 
-def _frames(device: Tracker, path: Path) -> Generator[TrackerFrame, None, None]:
+def _frames(device: OpenTracker, path: Path) -> Generator[TrackerFrame, None, None]:
     """Yield the frames of the device; where they end, the capture is unfinished and BadFile is raised."""
     yield from device
     raise _unfinished(path)
@@ -106,7 +106,7 @@ def _unfinished(path: Path) -> BadFile:
 
 def _record_stretch(
     frames: Iterator[TrackerFrame],
-    device: Tracker,
+    device: OpenTracker,
     writer: RecordingWriter,
     stretch: Stretch,
     ready: Callable[[], bool],

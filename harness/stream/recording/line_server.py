@@ -14,14 +14,20 @@ from pathlib import Path
 
 from harness.core.interrupts import defer_interrupts
 from harness.errors import BadFile, BadInput
-from harness.stream.is900.codec.commands import FACTORY_DEFAULTS, POLL, RESTART, STATUS, STOP, STREAM, CommandReader
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.is900.driver.config import DriverConfig, DriverTiming
-from harness.stream.is900.driver.connection import DeviceConnection, Host, NoAnswer, candidate_baud_rates, detect_device
-from harness.stream.is900.driver.exchange import read_wire_format
-from harness.stream.is900.driver.transport import LineLost, SelectTransport
-from harness.stream.is900.emulator.pty_port import ClientPty, check_link_is_free
 from harness.stream.line_events import LineEvent, LineEventKind
+from harness.stream.polhemus.codec.commands import FACTORY_DEFAULTS, POLL, RESTART, STATUS, STOP, STREAM, CommandReader
+from harness.stream.polhemus.codec.reader import WireFormat
+from harness.stream.polhemus.driver.config import DriverTiming, LineConfig
+from harness.stream.polhemus.driver.connection import (
+    DeviceConnection,
+    Host,
+    NoAnswer,
+    candidate_baud_rates,
+    detect_device,
+)
+from harness.stream.polhemus.driver.exchange import read_wire_format
+from harness.stream.polhemus.driver.transport import LineLost, SelectTransport
+from harness.stream.polhemus.emulator.pty_port import ClientPty, check_link_is_free
 from harness.stream.recording.blocks import RECEIVED, SENT
 from harness.stream.recording.recorder import PROGRESS_INTERVAL_S
 from harness.stream.recording.recording import RecordingWriter
@@ -41,7 +47,7 @@ _RETRY_S = 0.25
 def serve_line(
     port: str,
     link: Path,
-    config: DriverConfig,
+    config: LineConfig,
     writer: RecordingWriter,
     *,
     seconds: float | None = None,
@@ -71,7 +77,7 @@ class _LineServer:
         self,
         port: str,
         link: Path,
-        config: DriverConfig,
+        config: LineConfig,
         writer: RecordingWriter,
         log: Callable[[str], None],
         host: Host,
@@ -173,7 +179,9 @@ class _LineServer:
         self._line.wait_for_silence()  # answers to earlier commands of the program still pass
         self._asking = True
         try:
-            self._writer.on_configured(self._named(read_wire_format(self._line, self._config.rate_hz)))
+            self._writer.on_configured(
+                self._named(read_wire_format(self._line, self._config.rate_hz, self._config.family))
+            )
             self._format_known = True
         except (BadInput, BadFile) as error:
             self._log(f"{error} Every byte is recorded, but no frames can be replayed.")

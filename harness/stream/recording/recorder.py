@@ -10,13 +10,13 @@ from typing import Any
 
 from harness.errors import BadInput, HarnessError
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.is900.driver.config import DriverConfig
-from harness.stream.is900.driver.is900 import open_tracker
-from harness.stream.is900.driver.tracker import Tracker
-from harness.stream.line_events import EventCounter, LineEvent
-from harness.stream.recording.blocks import RECEIVED
+from harness.stream.line_events import EventCounter, LineEvent, TrackedBodies
+from harness.stream.polhemus.codec.reader import WireFormat
+from harness.stream.ports import TrackerConfig, open_tracker_at
+from harness.stream.recording.blocks import POSES, RECEIVED
+from harness.stream.recording.pose_writer import PoseRecordingWriter
 from harness.stream.recording.recording import RecordingWriter
+from harness.stream.tracker import OpenTracker
 
 
 class RecordingSwitch:
@@ -31,6 +31,7 @@ class RecordingSwitch:
         self.failure = ""
         self._note = dict(note or {})
         self._wire: WireFormat | None = None
+        self._bodies: TrackedBodies | None = None
         self._writer: RecordingWriter | None = None
         self._lock = Lock()
 
@@ -45,10 +46,15 @@ class RecordingSwitch:
         with self._lock:
             if self._writer is not None:
                 raise BadInput(f"A recording into {self._writer.path} runs.", "Stop it first.")
-            if self._wire is None:
+            writer: RecordingWriter
+            if self._bodies is not None:
+                writer = PoseRecordingWriter(path, self._note)
+                writer.on_bodies(self._bodies)
+            elif self._wire is not None:
+                writer = RecordingWriter(path, self._note)
+                writer.on_configured(replace(self._wire, zeroed=False))  # the device's clock began earlier
+            else:
                 raise BadInput("No device is set up.", "Wait until records arrive.")
-            writer = RecordingWriter(path, self._note)
-            writer.on_configured(replace(self._wire, zeroed=False))  # the device's clock began earlier
             self._writer, self.failure = writer, ""
 
     def stop(self) -> Path:
@@ -76,6 +82,13 @@ class RecordingSwitch:
             self._wire = wire
         self._write("on_configured", wire)
 
+    def on_bodies(self, bodies: TrackedBodies) -> None:
+        with self._lock:
+            self._bodies = bodies
+
+    def on_frame(self, frame: TrackerFrame) -> None:
+        self._write("on_frame", frame)
+
     def on_event(self, event: LineEvent) -> None:
         self._write("on_event", event)
 
@@ -99,7 +112,7 @@ PROGRESS_INTERVAL_S = 1.0
 
 def record_port(
     port: str,
-    config: DriverConfig,
+    config: TrackerConfig,
     writer: RecordingWriter,
     *,
     seconds: float | None = None,
@@ -116,7 +129,7 @@ def record_port(
 
     counts: dict[str, int] = {}
     events = EventCounter(log)
-    with _count_interrupt(counts), open_tracker(port, config, observer=writer, on_event=events) as device:
+    with _count_interrupt(counts), open_tracker_at(port, config, observer=writer, on_event=events) as device:
         name = device.identification or "a device"
         log(f"{name} at {port}; stations {device.station_list}; Ctrl-C ends the recording")
         log(device.setup_note)
@@ -144,12 +157,14 @@ def _count_interrupt(counts: dict[str, int]) -> Iterator[None]:
         counts["interrupted"] = 1
 
 
-def _progress_text(device: Tracker, frame: TrackerFrame, writer: RecordingWriter) -> str:
+def _progress_text(device: OpenTracker, frame: TrackerFrame, writer: RecordingWriter) -> str:
     health = device.health()
     beyond = f", {health['out_of_range']:.0f} positions out of range" if health["out_of_range"] else ""
     rate = f", {health['rate_hz']:.1f} Hz" if "rate_hz" in health else ""
-    kilobytes = 1e-3 * writer.counts[RECEIVED]
-    return f"{health['frames']:.0f} frames{rate}, {tracked_text(frame)}{beyond}, {kilobytes:.0f} kB"
+    written = f"{1e-3 * writer.counts[RECEIVED]:.0f} kB"
+    if POSES in writer.counts:
+        written = f"{writer.counts[POSES]} poses"
+    return f"{health['frames']:.0f} frames{rate}, {tracked_text(frame)}{beyond}, {written}"
 
 
 def tracked_text(frame: TrackerFrame) -> str:

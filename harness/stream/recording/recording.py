@@ -11,6 +11,7 @@ costs only the blocks it touches, and these are reported. A recording that was c
     answ         JSON of a command that a person sent, with the bytes and the decoded values of its answer
     mark         JSON of the stretch of a capture that begins here and lasts to the next mark, such as
                  {"stretch": "static"}; the stretch "" ends one
+    body, pose   poses of another program in place of bytes (`pose_recording.py`), in files of version 2
 """
 
 import json
@@ -27,7 +28,7 @@ from itertools import islice, pairwise
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Self
 
 import numpy as np
 
@@ -39,8 +40,8 @@ from harness.core.interrupts import defer_interrupts
 from harness.core.output_place import place_fault
 from harness.core.parsing import parse_json
 from harness.errors import BadFile, HarnessError, SystemFault, shorten, was_interrupted
-from harness.stream.is900.codec.reader import ByteCapture, WireFormat
 from harness.stream.line_events import LineEvent
+from harness.stream.polhemus.codec.reader import ByteCapture, WireFormat
 from harness.stream.recording.blocks import (
     ANSWERED,
     CONFIGURED,
@@ -49,9 +50,9 @@ from harness.stream.recording.blocks import (
     MARK,
     MAX_PAYLOAD_BYTES,
     NOTE,
+    POSES_VERSION,
     RECEIVED,
     SENT,
-    VERSION,
     DamagedSpan,
     RecordingBlock,
     encode_block,
@@ -107,7 +108,7 @@ class Recording:
 
         "" stands for a note without the name, and for blocks that come before the first note.
         """
-        return _note_values(self, self.blocks(), name)
+        return note_values(self, self.blocks(), name)
 
     @property
     def events(self) -> list[dict[str, Any]]:
@@ -194,10 +195,10 @@ def _seek_first_block(path: Path, file: BinaryIO) -> bool:
 def read_marks(path: Path) -> list[dict[str, Any]]:
     """Return what `Recording.marks` has, from a file that is read in pieces. Raises BadFile as `read_recording`."""
     with open_recording(path) as file:
-        return Recording(path, b"").timed_contents(MARK, _whole_blocks(file))
+        return Recording(path, b"").timed_contents(MARK, whole_blocks(file))
 
 
-def _note_values(parser: Recording, blocks: Iterable[RecordingBlock], name: str) -> tuple[str, ...]:
+def note_values(parser: Recording, blocks: Iterable[RecordingBlock], name: str) -> tuple[str, ...]:
     """As `Recording.note_values`, of these blocks."""
     values: dict[str, None] = {}
     for block in blocks:
@@ -208,7 +209,7 @@ def _note_values(parser: Recording, blocks: Iterable[RecordingBlock], name: str)
     return tuple(values)
 
 
-def _whole_blocks(file: BinaryIO) -> Iterator[RecordingBlock]:
+def whole_blocks(file: BinaryIO) -> Iterator[RecordingBlock]:
     """Yield the whole blocks of a file from its present position on; it is read in pieces."""
     return (entry for entry in scan_blocks(file) if isinstance(entry, RecordingBlock))
 
@@ -237,9 +238,12 @@ def describe_damage(entries: Iterable[RecordingBlock | DamagedSpan], damage: lis
 def _check_kind(path: Path, data: bytes) -> None:
     """Raise BadFile unless the file is a recording or the beginning of one."""
     version = read_version(data)
-    if version is not None and version > VERSION:
-        problem = f"a recording of version {version}"
-        raise BadFile(path, problem, f"version {VERSION} at most", "Use the newer version of the harness that made it.")
+    if version == POSES_VERSION:
+        expected = "a recording of a device's line"
+        raise BadFile(path, "a recording of poses", expected, "`harness inspect`, `replay` and `view` read it.")
+    if version is not None and version > POSES_VERSION:
+        problem, known = f"a recording of version {version}", f"version {POSES_VERSION} at most"
+        raise BadFile(path, problem, known, "Use the newer version of the harness that made it.")
     if (
         version is None
         and not FILE_HEADER.startswith(data)
@@ -256,15 +260,16 @@ class RecordingWriter:
     another process is recording into, or that cannot be written.
     """
 
+    _header = FILE_HEADER
+
     def __init__(self, path: Path | str, note: Mapping[str, Any] | None = None) -> None:
         """Check the file. `note` describes the origin of the recording."""
         self.path = Path(path)
         self.counts = dict.fromkeys((RECEIVED, SENT, CONFIGURED, EVENT, ANSWERED, MARK), 0)
         """Bytes received and sent, and numbers of configurations, events, answers and marks, by block kind."""
         self._note = dict(note or {})
-        existing = self._existing_formats()
-        self._new = existing is None
-        self._stations = existing[-1].stations if existing else None
+        self._stations: tuple[str, ...] | None = None
+        self._new = not self._find_existing()
         self._file: int | None = None
         self._closed = self._kept = False
         self._begin_bytes = 0
@@ -292,20 +297,24 @@ class RecordingWriter:
 
         Raises BadFile for other stations than before, because a stream's stations never change.
         """
-        if self._stations not in (None, wire.stations):
-            raise BadFile(
-                self.path,
-                f"a recording of the stations {', '.join(self._stations or ())}",
-                f"one of {', '.join(wire.stations)}",
-                "Record other stations into another file.",
-            )
-        self._stations = wire.stations
+        self._keep_stations(wire.stations)
         content = asdict(wire) | {"characters": wire.characters.decode("latin-1")}
-        for name, usual in (("zeroed", True), ("datagrams", False)):
-            if content[name] is usual:
+        for name, usual in (("zeroed", True), ("datagrams", False), ("family", "is900")):
+            if content[name] == usual:
                 del content[name]  # earlier versions refuse a key that they do not know
         self._append_json(CONFIGURED, content, monotonic_s, wall_s)
         self.counts[CONFIGURED] += 1
+
+    def _keep_stations(self, stations: tuple[str, ...]) -> None:
+        """Raise BadFile for other stations than before."""
+        if self._stations not in (None, stations):
+            raise BadFile(
+                self.path,
+                f"a recording of the stations {', '.join(self._stations or ())}",
+                f"one of {', '.join(stations)}",
+                "Record other stations into another file.",
+            )
+        self._stations = stations
 
     def on_event(self, event: LineEvent) -> None:
         """Write an event on the line."""
@@ -359,7 +368,7 @@ class RecordingWriter:
                 if self._new and self.empty:
                     self.path.unlink(missing_ok=True)
 
-    def __enter__(self) -> "RecordingWriter":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -400,11 +409,11 @@ class RecordingWriter:
             os.close(file)
             raise BadFile(self.path, "in use", _WRITABLE_FILE, "Another process is recording into it.")
         self._begin_bytes = os.fstat(file).st_size
-        _write_all(file, FILE_HEADER[self._begin_bytes :])
+        _write_all(file, self._header[self._begin_bytes :])
         return file
 
-    def _existing_formats(self) -> list[WireFormat] | None:
-        """Return the wire formats of the recording to continue; None for a new file. Raises BadFile."""
+    def _find_existing(self) -> bool:
+        """Whether there is a recording to continue, which is then checked. Raises BadFile."""
         try:
             mode = self.path.stat().st_mode
             if not stat.S_ISREG(mode):
@@ -413,19 +422,26 @@ class RecordingWriter:
             if not os.access(self.path, os.W_OK):
                 raise PermissionError("you may not write to it")
             with open_input_file(self.path, EXPECTED_FILE, MAX_BYTES) as file:
-                _seek_first_block(self.path, file)
-                parser, blocks = Recording(self.path, b""), _whole_blocks(file)
-                kept = [*islice(blocks, 1), *(block for block in blocks if block.kind in (CONFIGURED, NOTE))]
-            self._check_plan(_note_values(parser, kept, PLAN_FILE))
-            return [parser.format_of(block) for block in kept if block.kind == CONFIGURED]
+                self._read_existing(file)
+            return True
         except (FileNotFoundError, NotADirectoryError):
             if fault := place_fault(self.path.parent):
                 raise BadFile(self.path, fault, _WRITABLE_FILE, "Choose another.") from None
             if not self.path.parent.is_dir():
                 raise BadFile(self.path, "no such folder", _WRITABLE_FILE, "Make the folder first.") from None
-            return None
+            return False
         except OSError as error:
             raise _file_error(self.path, error) from error
+
+    def _read_existing(self, file: BinaryIO) -> None:
+        """Read what the recording to continue says about its plan and stations. Raises BadFile."""
+        _seek_first_block(self.path, file)
+        parser, blocks = Recording(self.path, b""), whole_blocks(file)
+        kept = [*islice(blocks, 1), *(block for block in blocks if block.kind in (CONFIGURED, NOTE))]
+        self._check_plan(note_values(parser, kept, PLAN_FILE))
+        for block in kept:
+            if block.kind == CONFIGURED:
+                self._stations = parser.format_of(block).stations
 
     def _check_plan(self, existing: tuple[str, ...]) -> None:
         """Raise BadFile unless the notes of the file name the plan of the new one: a plan comes before its data."""

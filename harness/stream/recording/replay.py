@@ -7,7 +7,7 @@ of reception. Frames that the driver closed on a timeout are closed at the same 
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from threading import Event
 from typing import Literal
@@ -16,7 +16,7 @@ import numpy as np
 
 from harness.errors import BadFile, BadInput
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.reader import ByteCapture, ContinuousFrameReader, WireFormat
+from harness.stream.polhemus.codec.reader import ByteCapture, ContinuousFrameReader, WireFormat
 from harness.stream.recording.blocks import CONFIGURED, RECEIVED
 from harness.stream.recording.recording import EXPECTED_FILE, Recording, read_recording
 
@@ -42,6 +42,21 @@ def parse_speed(text: str) -> ReplaySpeed:
 def wait_for_enter() -> bool:
     """Wait for the Enter key. Returns False at the end of the input."""
     return bool(sys.stdin.readline())
+
+
+def pace_frames(
+    due_frames: Iterable[tuple[float, TrackerFrame]], speed: ReplaySpeed, step: Callable[[], bool], closed: Event
+) -> Iterator[TrackerFrame]:
+    """Yield frames at the times at which they are due [s], at this speed, until `closed` is set."""
+    began_s = first_s = None
+    for due_s, frame in due_frames:
+        if isinstance(speed, float):
+            if began_s is None or first_s is None:
+                began_s, first_s = time.monotonic(), due_s
+            closed.wait(began_s + (due_s - first_s) / speed - time.monotonic())
+        if closed.is_set() or (speed == "step" and not step()):
+            return
+        yield frame
 
 
 class RecordingStream:
@@ -105,15 +120,7 @@ class RecordingStream:
         return received_s + self._wall_ahead_s
 
     def __iter__(self) -> Iterator[TrackerFrame]:
-        began_s = first_s = None
-        for due_s, frame in self._due_frames():
-            if isinstance(self._speed, float):
-                if began_s is None or first_s is None:
-                    began_s, first_s = time.monotonic(), due_s
-                self._closed.wait(began_s + (due_s - first_s) / self._speed - time.monotonic())
-            if self._closed.is_set() or (self._speed == "step" and not self._step()):
-                return
-            yield frame
+        return pace_frames(self._due_frames(), self._speed, self._step, self._closed)
 
     def _due_frames(self) -> Iterator[tuple[float, TrackerFrame]]:
         """Yield every frame with the time at which it is due on the virtual clock [s]."""

@@ -8,17 +8,18 @@ file are skipped, and named by `CaptureReader.damage`.
 import math
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from harness.core.arrays import Bools, Floats, freeze
 from harness.errors import BadFile
-from harness.stream.is900.codec.decoder import Garbage, RecordRun
-from harness.stream.is900.codec.reader import ReadingsDecoder, WireFormat, make_decoder
-from harness.stream.is900.codec.readings import Readings, concatenate_readings
+from harness.stream.polhemus.codec.decoder import Garbage, RecordRun
+from harness.stream.polhemus.codec.reader import ReadingsDecoder, WireFormat, make_decoder
+from harness.stream.polhemus.codec.readings import Readings, concatenate_readings
 from harness.stream.recording.blocks import CONFIGURED, MARK, NOTE, RECEIVED, RecordingBlock, scan_blocks
 from harness.stream.recording.recording import EXPECTED_FILE, Recording, describe_damage, open_recording
 
@@ -35,7 +36,8 @@ class StationReadings:
     received_s: Floats
     """(N,) host clock when the last byte arrived [s]."""
     measured_s: Floats
-    """(N,) device clock, continuous as in frames [s]; NaN where the stamp is missing or damaged."""
+    """(N,) device clock, continuous as in frames [s]; NaN where the stamp is missing or damaged. For a FASTRAK, which
+    has no clock, `arrival_times_s`."""
     stamp_s: Floats
     """(N,) stamp as it was sent [s]; NaN where it is missing."""
     position_m: Floats
@@ -199,9 +201,37 @@ class _Session:
             readings = concatenate_readings([part for part, _ in decoded])
             stamps_s = np.concatenate([stamp_s for _, stamp_s in decoded])
             for row, parts in enumerate(self._parts):
-                parts.append(_select(readings, stamps_s, row))
+                part = _select(readings, stamps_s, row)
+                if self.wire.family == "fastrak":
+                    times_s = arrival_times_s(part.received_s, 1.0 / self.wire.rate_hz)
+                    part = replace(part, measured_s=times_s)
+                parts.append(part)
         decided = int(ends.searchsorted(self._fed - self._decoder.pending, side="right"))
         self._ends, self._ends_s = self._ends[decided:], self._ends_s[decided:]
+
+
+_LATE_S = 0.25
+"""Records are compared with those of so much time after them [s] [choice]. Clocks part by 25 us meanwhile."""
+
+
+def arrival_times_s(received_s: Floats, period_s: float) -> Floats:
+    """Times (N,) of the records of a station that has no clock, from their reception (N,) by the host's clock [s].
+
+    A record may be read late, but never early. So it came a period before the next one at the latest, two before the
+    one after that, and so on; the earliest of these times counts. Times strictly increase.
+    """
+    count, window = len(received_s), max(round(_LATE_S / period_s), _LEAST_RECORDS)
+    since_s = received_s - period_s * np.arange(count)
+    ahead_s = sliding_window_view(np.append(since_s, np.full(window, np.inf)), window).min(axis=1)
+    rising_s = _LEAST_STEP_S * np.arange(count)
+    out: Floats = np.maximum.accumulate(ahead_s[:count] + period_s * np.arange(count) - rising_s) + rising_s
+    return out
+
+
+_LEAST_RECORDS = 8
+"""Fewest of these records [choice]."""
+_LEAST_STEP_S = 1e-9
+"""Least step of these times [s]."""
 
 
 def _select(readings: Readings, stamps_s: Floats, row: int) -> StationReadings:

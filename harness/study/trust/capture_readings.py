@@ -1,15 +1,15 @@
-"""All readings of one capture, read once: what `validate` relates to a reference."""
+"""All readings of one capture or pose log, read once: what `validate` relates to a reference."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from harness.errors import BadFile
-from harness.measure import MeasuredPoses
-from harness.stream.is900.codec import WireFormat
+from harness.errors import BadFile, BadInput
+from harness.measure import MeasuredPoses, mean_period_s
+from harness.stream.polhemus.codec import WireFormat
 from harness.stream.recording import CaptureReader, StationReadings
 
 
@@ -20,7 +20,8 @@ class CaptureReadings:
     path: Path
     note: Mapping[str, Any]
     """The latest note on the origin of the recording."""
-    wire: WireFormat
+    wire: WireFormat | None
+    """Format of the device's records; None for a pose log, which has no device's records."""
     readings: Mapping[str, StationReadings]
     """Station -> its readings."""
     damage: tuple[str, ...]
@@ -31,7 +32,21 @@ class CaptureReadings:
     @property
     def stations(self) -> tuple[str, ...]:
         """Station names, in the order of the device's stations."""
-        return self.wire.stations
+        return self.wire.stations if self.wire else tuple(self.readings)
+
+    @property
+    def rate_hz(self) -> float:
+        """Nominal rate of each station; of a pose log the inverse of its mean period [Hz]."""
+        if self.wire:
+            return self.wire.rate_hz
+        return round(1.0 / mean_period_s([one.measured_s for one in self.readings.values()]), 3)
+
+    def only(self, stations: Sequence[str]) -> "CaptureReadings":
+        """The readings of some stations; BadInput for one that is not there."""
+        for name in stations:
+            if name not in self.readings:
+                raise BadInput(f"No station {name!r} in {self.path.name}.", f"It has {', '.join(self.readings)}.")
+        return replace(self, readings={name: self.readings[name] for name in stations})
 
     @property
     def duration_s(self) -> float:

@@ -15,11 +15,11 @@ from harness.core.fields import replace_fields
 from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
-from harness.measure import UnitFile, UnitProfile, measure_profile
+from harness.measure import Bar, SurveyComparison, UnitFile, UnitProfile, measure_log_profile, measure_profile
 from harness.measure.reports import Departure, UnitReport, compare_with_expected, make_unit_report
 from harness.results.files import file_digest
 from harness.simulate import noise_preset
-from harness.stream.recording import EXPECTED_FILE, CaptureReader
+from harness.stream.recording import EXPECTED_FILE, CaptureReader, PoseRecording
 
 UNIFORM_KEYS = (
     "components.excursion.size_m",
@@ -147,6 +147,8 @@ class Characterization:
     checks: tuple[Departure, ...]
     expected_from: str
     """Origin of the expected numbers: the preset, or the name of an earlier unit."""
+    survey: SurveyComparison | None = None
+    """Rests against surveyed points; None without any."""
 
     @property
     def named(self) -> tuple[Departure, ...]:
@@ -156,26 +158,43 @@ class Characterization:
     @property
     def report(self) -> UnitReport:
         """All that the unit's page shows."""
-        defaults = {key: number.value for key, number in preset_values().items()}
-        return make_unit_report(self.profile, self.unit, self.checks, self.expected_from, defaults)
+        defaults = {key: number.value for key, number in preset_values().items()} if self.profile.items else {}
+        return make_unit_report(self.profile, self.unit, self.checks, self.expected_from, defaults, self.survey)
 
 
 def characterize_capture(
     reader: CaptureReader,
     *,
     expected: UnitFile | None = None,
-    rigid: tuple[str, str] | None = None,
+    bar: Bar | None = None,
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> Characterization:
     """Measure a unit from a capture, and compare it with the preset `default` or with an earlier unit file.
 
     The unit has the name of the capture. BadFile and BadInput as `measure.profile.measure_profile`.
     """
-    profile = measure_profile(reader, rigid=rigid, progress=progress)
-    unit = make_unit_file(profile, reader.path)
+    profile = measure_profile(reader, bar=bar, progress=progress)
     known = preset_values() if expected is None else unit_values(expected)
+    return _compare(profile, reader.path, known, expected.name if expected else "the preset default")
+
+
+def characterize_log(
+    recording: PoseRecording,
+    *,
+    expected: UnitFile | None = None,
+    bar: Bar | None = None,
+    progress: ProgressCallback = lambda step, done, planned: None,
+) -> Characterization:
+    """Measure the source of a file of poses, and compare it with an earlier unit file, but with no preset."""
+    profile = replace(measure_log_profile(recording.log, bar=bar, progress=progress), damage=recording.damage)
+    known = {} if expected is None else unit_values(expected)
+    return _compare(profile, recording.path, known, expected.name if expected else "")
+
+
+def _compare(profile: UnitProfile, path: Path, known: Mapping[str, Interval], name: str) -> Characterization:
+    unit = make_unit_file(profile, path)
     checks = check_departures(measured_numbers(profile), expected_numbers(profile, known))
-    return Characterization(profile, unit, tuple(checks), expected.name if expected else "the preset default")
+    return Characterization(profile, unit, tuple(checks), name)
 
 
 def make_unit_file(profile: UnitProfile, path: Path) -> UnitFile:
@@ -188,9 +207,9 @@ def make_unit_file(profile: UnitProfile, path: Path) -> UnitFile:
     return UnitFile(
         path.stem,
         nest_components(_in_order(values), components),
-        {"rate_hz": profile.rate_hz, "items": list(profile.items)},
+        {"rate_hz": profile.rate_hz} | ({"items": list(profile.items)} if profile.items else {}),
         {key: number for key, number in {**measured, **_means(profile)}.items() if number.is_measured},
-        {**reasons, **{key: reason for key, reason in DEFAULT_KEPT.items() if key in defaults}},
+        {**reasons, **{key: reason for key, reason in DEFAULT_KEPT.items() if key in defaults and profile.items}},
         capture=_describe_capture(profile, path),
     )
 
@@ -207,7 +226,9 @@ def measured_numbers(profile: UnitProfile) -> dict[tuple[str, str], Interval]:
 
 
 def expected_numbers(profile: UnitProfile, known: Mapping[str, Interval]) -> dict[tuple[str, str], Interval]:
-    """What is expected of the measured numbers: the known ones, and of the line that no record is lost or repeated."""
+    """What is expected of the measured numbers: the known ones, and of a line that no record is lost or repeated."""
+    if not profile.items:  # a file of poses came over no line
+        return {(key, ""): number for key, number in known.items()}
     line = dict.fromkeys(("timing.lost_share", "timing.duplicate_share", "timing.clock_age_s"), 0.0)
     resolution = profile.timing.all_stations["timing.stamp_resolution_s"]
     if resolution.value > 2.0 * profile.timing.expected_resolution_s:  # else it is as fine as the format allows

@@ -31,12 +31,21 @@ TRAJECTORY_SUFFIXES = (".c3d", ".tum", ".csv")
 FEWEST_MARKERS = 3
 MAX_TEXT_BYTES = 512 * MEGABYTE
 CSV_COLUMNS = ("time_s", "station", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
+_LONGEST_HEAD = 65536
 _LABEL_END = re.compile(r"[\s_.\-:]*(?:\d+|[A-Za-z])$")
 _UNIT_TOLERANCE = 1e-2
 _MOST_RESIDUAL_M = 0.02
 """Largest RMS residual of the markers of a rigid body [m] [choice]."""
 _LEAST_SPREAD_M = 0.005
 """Least distance of the markers of a body from their common line [m]."""
+
+
+def is_foreign_table(path: Path) -> bool:
+    """Whether a file is a CSV table without a column for the station, such as another program writes."""
+    if path.suffix.lower() != ".csv":
+        return False
+    with open(path, "rb") as file:
+        return b"station" not in file.readline(_LONGEST_HEAD)
 
 
 def read_truth_file(path: Path, stations: Sequence[str]) -> TruthMotion:
@@ -61,9 +70,9 @@ def truth_of_markers(path: Path, markers: MarkerClip, stations: Sequence[str]) -
     BadFile where a station has fewer than three markers, or where they lie on one line.
     """
     time_s = np.arange(len(markers)) / markers.rate_hz
-    bodies, notes = {}, []
+    bodies, notes, noise = {}, [], {}
     for station in stations:
-        rows = [row for row, label in enumerate(markers.labels) if _is_marker_of(label, station)]
+        rows = [row for row, label in enumerate(markers.labels) if body_of_label(label) == station.lower()]
         if len(rows) < FEWEST_MARKERS:
             found = f"{len(rows)} marker(s) of station {station!r} among {', '.join(markers.labels[:12])}"
             raise BadFile(path, found, "three or more", f"Label them {station}_1, {station}_2, {station}_3.")
@@ -73,13 +82,27 @@ def truth_of_markers(path: Path, markers: MarkerClip, stations: Sequence[str]) -
             advice = "Are labels exchanged or twice, or are markers on different bodies?"
             raise BadFile(path, found, f"{1e3 * _MOST_RESIDUAL_M:g} mm at most", advice)
         bodies[station] = TruthPoses(time_s, place, turn)
+        noise[station] = _marker_noise(markers.position_m[:, rows], residual_m)
         notes.append(f"The {len(rows)} markers of {station} fit one rigid body to {1e3 * residual_m:.2g} mm (RMS).")
     return TruthMotion(
         f"the markers of {path.name}, {time_s[-1]:.1f} s",
         bodies,
         common_names(stations, bodies),
+        noise=noise,
         notes=(*notes, *markers.notes),
     )
+
+
+def _marker_noise(position_m: Floats, residual_m: float) -> tuple[float, float]:
+    """Standard deviations on each axis of the position [m] and the rotation [rad] of a body of markers (T, M, 3).
+
+    `residual_m` is the RMS distance that the fit leaves to each marker; six of 3 M numbers are fitted.
+    """
+    count = position_m.shape[1]
+    sigma_m = residual_m / np.sqrt(3.0 - 6.0 / count)
+    whole = position_m[np.isfinite(position_m[..., 0]).all(axis=1)][0]
+    around = float(np.sum((whole - whole.mean(axis=0)) ** 2))
+    return float(sigma_m / np.sqrt(count)), float(sigma_m / np.sqrt(2.0 / 3.0 * around))
 
 
 def fit_rigid_body(path: Path, station: str, position_m: Floats) -> tuple[Floats, Floats, float]:
@@ -214,5 +237,6 @@ def _poses(path: Path, time_s: Floats, position_m: Floats, quaternion: Floats) -
     return TruthPoses(unique_s, poses[rows, :3], poses[rows, 3:])
 
 
-def _is_marker_of(label: str, station: str) -> bool:
-    return _LABEL_END.sub("", label.strip()).lower() == station.lower()
+def body_of_label(label: str) -> str:
+    """The name of the body that a marker's label names, in small letters: "head" of `HEAD-A`."""
+    return _LABEL_END.sub("", label.strip()).lower()

@@ -49,6 +49,12 @@ class TruthMotion:
     """Whether the reference's clock is the host's clock of the capture, so that latency shows."""
     is_tracker: bool = False
     """Whether the reference is a tracker too, with errors of its own that a comparison with a preset would name."""
+    is_log: bool = False
+    """Whether the reference is a pose log, whose conventions nobody states."""
+    start_unix_s: float | None = None
+    """Unix time of time 0 of a pose log [s]; None where it does not tell."""
+    noise: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Body -> standard deviations of its positions [m] and rotations [rad] on each axis, where they are known."""
     loop_s: float = math.inf
     """Time after which the reference repeats [s]."""
     playback: Playback | None = None

@@ -8,11 +8,14 @@ import numpy as np
 from harness.errors import BadFile, BadInput, NotComparable, UnknownName
 from harness.experiment import find_playback
 from harness.experiment.scenarios import Scenario, load_scenario
-from harness.measure import LEAST_OVERLAP_S, TruthSpline, coarse_offset, record_period_s
+from harness.measure import TruthSpline, coarse_offset
 from harness.mocap import CLIP_FORMATS, LibraryFolders, read_clip
-from harness.stream.recording import CaptureReader, RecordingStream
+from harness.stream import PoseLog
+from harness.stream.recording import CaptureReader, RecordingStream, is_pose_file, open_poses
 from harness.study.trust.capture_readings import CaptureReadings, measured_poses, read_capture
-from harness.study.trust.truth_files import TRAJECTORY_SUFFIXES, read_truth_file
+from harness.study.trust.logged_poses import truth_of_log
+from harness.study.trust.marker_poses import read_marker_poses
+from harness.study.trust.truth_files import TRAJECTORY_SUFFIXES, is_foreign_table, read_truth_file
 from harness.study.trust.truth_motion import TruthMotion, truth_of_capture, truth_of_clip, truth_of_playback
 
 _LOOPED_CORRELATION = 0.8
@@ -35,6 +38,8 @@ def load_truth(capture: CaptureReadings, source: TruthSource) -> TruthMotion:
     """The reference of a capture. BadFile, BadInput and UnknownName that name what is missing."""
     path = Path(source.name)
     suffix = path.suffix.lower()
+    if path.is_file() and (log := _read_log(path, capture)) is not None:
+        return truth_of_log(log, capture.stations)
     if path.is_dir() or suffix in TRAJECTORY_SUFFIXES:
         return read_truth_file(path, capture.stations)
     if suffix.lstrip(".") in (*CLIP_FORMATS, "asf"):
@@ -47,6 +52,17 @@ def load_truth(capture: CaptureReadings, source: TruthSource) -> TruthMotion:
         if error.name != source.name or not suffix:
             raise
         raise BadFile(path, "no such file", "a clip, or a file with a reference", "Check the path.") from error
+
+
+def _read_log(path: Path, capture: CaptureReadings) -> PoseLog | None:
+    """Poses of another program; None for a file of another kind, and for a table that names the capture's stations."""
+    if path.suffix.lower() == ".c3d" and capture.wire is None:
+        return read_marker_poses(path)
+    if path.suffix.lower().lstrip(".") in (*CLIP_FORMATS, "asf", "c3d") or not is_pose_file(path):
+        return None
+    if capture.wire is not None and path.suffix.lower() in TRAJECTORY_SUFFIXES and not is_foreign_table(path):
+        return None
+    return open_poses([path]).log
 
 
 def _scenario_of(capture: CaptureReadings, source: TruthSource) -> Scenario:
@@ -80,7 +96,7 @@ def _plays_in_loops(capture: CaptureReadings, loops: TruthMotion) -> bool:
         return False
     splines = {station: TruthSpline(loops.bodies[loops.body_of[station]]) for station in poses}
     try:
-        found = coarse_offset(poses, splines, record_period_s(poses), LEAST_OVERLAP_S)
+        found = coarse_offset(poses, splines)
     except NotComparable:
         return False
     return found.correlation >= _LOOPED_CORRELATION

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.number_format import Interval
+from harness.core.number_format import Interval, format_fixed
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput, NotComparable
 from harness.experiment import Evaluation, evaluate_each, registered_take
@@ -14,11 +14,12 @@ from harness.measure import (
     MeasuredPoses,
     Registration,
     StationResiduals,
+    TruthPoses,
     UnitFile,
     identify_stations,
-    record_period_s,
     register_poses,
     require_stamps,
+    same_directions,
 )
 from harness.measure.reports import (
     CaptureSummary,
@@ -30,7 +31,7 @@ from harness.measure.reports import (
     estimated_poses,
     residual_series,
 )
-from harness.stream.is900.codec import BITS_PER_BYTE, WireFormat, record_size
+from harness.stream.polhemus.codec import BITS_PER_BYTE, WireFormat, record_size
 from harness.stream.recording import RecordingStream, StationReadings
 from harness.study.trust.capture_readings import CaptureReadings, measured_poses
 from harness.study.trust.characterization import correct_departures, preset_components, preset_values
@@ -47,12 +48,29 @@ _MOST_LEFT_OUT = 0.15
 _NO_HOST_CLOCK = "reference not on the host's clock"
 
 
+_NO_VERTICAL = "nothing says which axis of a pose log is vertical"
+
+
+@dataclass(frozen=True)
+class ValidationOptions:
+    """What a user allows and knows about a capture and its reference."""
+
+    least_matched: float = 0.95
+    """Smallest share of the records due that must have a reference."""
+    truth_noise: tuple[float, float] | None = None
+    """Standard deviations of the reference's positions [m] and rotations [rad] on each axis; None where unknown."""
+
+
 @dataclass(frozen=True, eq=False)
 class Validation:
     """What a reference shows of a capture."""
 
     capture: CaptureReadings
     truth: TruthMotion
+    poses: Mapping[str, MeasuredPoses]
+    """Station -> the poses that were registered, inverted where the capture holds body-from-world poses."""
+    bodies: Mapping[str, TruthPoses]
+    """Body -> its reference, likewise."""
     registration: Registration
     exchanged: Mapping[str, str]
     """Station -> body that carries it, where that is not the stated one."""
@@ -70,6 +88,7 @@ def validate_capture(
     truth: TruthMotion,
     *,
     expected: UnitFile | None = None,
+    options: ValidationOptions = ValidationOptions(),
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> Validation:
     """Register a capture with its reference and compare the result with the preset or an earlier unit file.
@@ -79,8 +98,20 @@ def validate_capture(
     readings, wire = capture.readings, capture.wire
     poses, unseen = _comparable_poses(capture, truth)
     progress("registration", 1, 3)
-    pairs, exchanged = _identify(poses, truth)
-    registration = register_poses(poses, truth.bodies, pairs=pairs)
+    bodies: Mapping[str, TruthPoses] = truth.bodies
+    directions: tuple[str, ...] = ()
+    if wire is None and truth.is_log:
+        named = {station: truth.body_of[station] for station in poses}
+        poses, bodies, directions = same_directions(poses, truth.bodies, named)
+    pairs, exchanged = _identify(poses, replace(truth, bodies=bodies))
+    registration = register_poses(
+        poses,
+        bodies,
+        pairs=pairs,
+        least_matched=options.least_matched,
+        plain=wire is None,
+        truth_noise=dict.fromkeys(bodies, options.truth_noise) if options.truth_noise else truth.noise,
+    )
     progress("accuracy", 2, 3)
     numbers = {
         "time_offset_orientation_s": registration.values["time_offset_orientation_s"],
@@ -88,25 +119,24 @@ def validate_capture(
         "components.speed.ahead_s": registration.values["position_ahead_s"],
         "components.clock.drift_ppm": registration.values["clock_ratio_ppm"],
         "scale": registration.values["scale"],
-        "heading_rad": registration.values["heading_rad"],
+        "heading_rad": registration.values["heading_rad"] if wire else Interval.missing(_NO_VERTICAL),
         "latency_s": _latency_s(readings, registration, truth),
     }
-    period_s = record_period_s(poses)
     accuracy = {}
     for station, errors in registration.errors.items():
         accuracy[station] = StationAccuracy(
-            error_quantiles(errors.position_m, errors.valid, period_s),
-            error_quantiles(errors.rotation_rad, errors.valid, period_s),
+            error_quantiles(errors.position_m, errors.valid, errors.period_s),
+            error_quantiles(errors.rotation_rad, errors.valid, errors.period_s),
             int(errors.valid.sum()),
             float(np.mean(readings[station].quality == 0.0)),
         )
     checks = _checks(numbers, registration, truth, pairs, expected, wire)
-    due = round(registration.overlap_s * wire.rate_hz)
+    due = round(registration.overlap_s * capture.rate_hz)
     progress("", 3, 3)
     report = ValidationReport(
         name=capture.path.stem,
         capture=CaptureSummary(
-            capture.path.name, capture.duration_s, wire.stations, wire.rate_hz, damage=capture.damage
+            capture.path.name, capture.duration_s, capture.stations, capture.rate_hz, damage=capture.damage
         ),
         truth=truth.title,
         matched_frames=round(registration.matched * due),
@@ -124,12 +154,15 @@ def validate_capture(
         notes=(
             *capture.left_out,
             *unseen,
+            *directions,
+            *_describe_clocks(capture, truth, registration),
+            *describe_explained(registration),
             *describe_left_out(registration.errors),
             *truth.notes,
             "Errors are those after the registration: constant errors of room and mounts are in its numbers.",
         ),
     )
-    return Validation(capture, truth, registration, exchanged, report)
+    return Validation(capture, truth, poses, bodies, registration, exchanged, report)
 
 
 def _comparable_poses(capture: CaptureReadings, truth: TruthMotion) -> tuple[dict[str, MeasuredPoses], tuple[str, ...]]:
@@ -149,6 +182,26 @@ def _comparable_poses(capture: CaptureReadings, truth: TruthMotion) -> tuple[dic
         raise NotComparable(f"No station of {capture.path.name} has a pose.", "Record positions and orientations.")
     unseen = ", ".join(station for station in poses if station not in seen)
     return seen, (f"{unseen}: no pose in the whole capture; left out.",) if unseen else ()
+
+
+def _describe_clocks(capture: CaptureReadings, truth: TruthMotion, registration: Registration) -> tuple[str, ...]:
+    """The offset between Unix times, where both logs have them."""
+    start_s, other_s = capture.note.get("start_unix_s"), truth.start_unix_s
+    if start_s is None or other_s is None:
+        return ()
+    offset_s = registration.values["time_offset_orientation_s"].value + start_s - other_s
+    return (
+        f"By their Unix times the capture is {format_fixed(1e3 * offset_s, 1, grouped=True)} ms late, by orientation.",
+    )
+
+
+def describe_explained(registration: Registration) -> tuple[str, ...]:
+    """A sentence for each station on the share of its motion that the registration explains."""
+    return tuple(
+        f"{station}: room, mount, scale and clocks explain {format_fixed(1e2 * place, 2)} % of the variance of the "
+        f"positions and {format_fixed(1e2 * turn, 2)} % of that of the orientations."
+        for station, (place, turn) in registration.explained.items()
+    )
 
 
 def describe_left_out(errors: Mapping[str, StationResiduals]) -> tuple[str, ...]:
@@ -175,14 +228,15 @@ def evaluate_registered(
     if playback is None:
         raise BadInput(f"{found.truth.title} has no performer.", "Methods are scored on a clip.")
     frames = RecordingStream(capture.path)
-    take = registered_take(frames, found.registration, playback, capture.wire.rate_hz, found.truth.loop_s)
+    take = registered_take(frames, found.registration, playback, capture.rate_hz, found.truth.loop_s)
     return evaluate_each(methods, take, metrics=SCORED_METRICS, progress=progress)
 
 
 def session_unit(found: Validation, base: UnitFile | None, name: str) -> UnitFile:
     """A unit file that also holds what the reference showed: speed error, and the session's scale and latency."""
     wire = found.capture.wire
-    start = base or UnitFile(name, preset_components(), {"rate_hz": wire.rate_hz, "items": list(wire.items)})
+    tracker = {"rate_hz": found.capture.rate_hz} | ({"items": list(wire.items)} if wire else {})
+    start = base or UnitFile(name, preset_components(), tracker)
     components = {key: dict(table) for key, table in start.components.items()}
     measured, not_measured = dict(start.measured), dict(start.not_measured)
     for key in ("components.speed.ahead_s", "components.clock.drift_ppm"):
@@ -230,12 +284,12 @@ def _checks(
     truth: TruthMotion,
     pairs: Mapping[str, str],
     expected: UnitFile | None,
-    wire: WireFormat,
+    wire: WireFormat | None,
 ) -> list[Departure]:
-    if truth.is_tracker:
+    if truth.is_tracker or (wire is None and expected is None):
         return []
     preset = preset_components()
-    record_s = record_size(wire.items) * BITS_PER_BYTE / _DEFAULT_BAUD
+    record_s = record_size(wire.items) * BITS_PER_BYTE / _DEFAULT_BAUD if wire else 0.0
     known = {
         "components.speed.ahead_s": preset_values()["components.speed.ahead_s"],
         "components.clock.drift_ppm": preset_values()["components.clock.drift_ppm"],

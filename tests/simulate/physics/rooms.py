@@ -16,7 +16,7 @@ from harness.simulate.physics.room import PlacedRoom, Room
 from harness.simulate.physics.schedule import TICKS_PER_SLOT
 from harness.simulate.simulation import WORLD_FROM_TRACKER, exact_calibration
 from harness.simulate.trajectory import Trajectory
-from harness.stream.is900 import DEFAULT_EMITTERS
+from harness.stream.polhemus import DEFAULT_EMITTERS
 
 TICK_HZ = 400.0
 ORIGIN_M = np.array(TrackerConfig().origin_m)

@@ -17,8 +17,8 @@ from harness.simulate.physics.constellation import (
     middle_of_path_m,
 )
 from harness.simulate.physics.emitters import read_mcf, write_mcf
-from harness.stream.is900 import DEFAULT_EMITTERS
-from harness.stream.is900.codec import Emitter
+from harness.stream.polhemus import DEFAULT_EMITTERS
+from harness.stream.polhemus.codec import Emitter
 
 DOWN = (0.0, 0.0, 1.0)
 

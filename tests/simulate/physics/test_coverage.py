@@ -25,7 +25,7 @@ from harness.simulate.physics.coverage import (
 from harness.simulate.physics.room import Box, Room
 from harness.simulate.physics.sound import Sound
 from harness.simulate.simulation import exact_calibration
-from harness.stream.is900.codec import Emitter
+from harness.stream.polhemus.codec import Emitter
 
 
 def cave(cone_deg: float = 70.0, range_m: float = 4.0) -> Constellation:

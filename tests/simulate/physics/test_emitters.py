@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from harness.core.package_data import data_folder
 from harness.errors import BadFile
 from harness.simulate.physics.emitters import MAX_MCF_BYTES, read_mcf, write_mcf
-from harness.stream.is900.codec import Emitter
+from harness.stream.polhemus.codec import Emitter
 
 LINE = b"31F      1   -0.9144   -0.6096    0.0000   0.00   0.00   1.00   5001\r\n"
 OTHERS = [

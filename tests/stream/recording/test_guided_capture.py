@@ -16,10 +16,10 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadFile
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.samples import DeviceSamples
 from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
-from harness.stream.is900.emulator.server import serve_emulator
+from harness.stream.is900.emulator.emulator import serve_emulator
+from harness.stream.polhemus.codec.samples import DeviceSamples
 from harness.stream.recording import guided_capture
 from harness.stream.recording.guided_capture import Stretch, capture_stretches, finished_stretches
 from harness.stream.recording.recording import read_recording
@@ -57,7 +57,7 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
     def open_on_bench(port: str, config: DriverConfig, **observers: Any) -> Is900:
         return Is900(bench.port, config, host=bench.host, **observers)
 
-    monkeypatch.setattr(guided_capture, "open_tracker", open_on_bench)
+    monkeypatch.setattr(guided_capture, "open_tracker_at", open_on_bench)
     return bench
 
 
@@ -152,14 +152,14 @@ def test_a_stretch_that_was_cut_is_recorded_again(bench: Bench, tmp_path: Path) 
 def test_a_device_that_ends_leaves_the_stretch_unfinished(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path, opened = tmp_path / "a.rec", vars(guided_capture)["open_tracker"]
+    path, opened = tmp_path / "a.rec", vars(guided_capture)["open_tracker_at"]
     devices: list[Any] = []
 
     def kept(*words: Any, **more: Any) -> Any:
         devices.append(opened(*words, **more))
         return devices[-1]
 
-    monkeypatch.setattr(guided_capture, "open_tracker", kept)
+    monkeypatch.setattr(guided_capture, "open_tracker_at", kept)
 
     def close(text: str) -> None:
         if text.startswith("static: 2 s left"):

@@ -13,8 +13,8 @@ import serial
 from harness.experiment import Playback, prepare_playback
 from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
-from harness.stream.is900.emulator.pty_port import ABSENT_S, MAX_WAITING_BYTES, ClientPty
-from harness.stream.is900.emulator.server import serve_emulator
+from harness.stream.is900.emulator.emulator import serve_emulator
+from harness.stream.polhemus.emulator.pty_port import ABSENT_S, MAX_WAITING_BYTES, ClientPty
 from harness.stream.recording.line_server import serve_line
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream

@@ -15,9 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.errors import BadFile, SystemFault
-from harness.stream.is900.codec.reader import ByteCapture, WireFormat
-from harness.stream.is900.codec.records import RecordFormat
 from harness.stream.line_events import LineEvent
+from harness.stream.polhemus.codec.reader import ByteCapture, WireFormat
+from harness.stream.polhemus.codec.records import RecordFormat
 from harness.stream.recording.blocks import (
     BLOCK_MARKER,
     CONFIGURED,
@@ -25,9 +25,9 @@ from harness.stream.recording.blocks import (
     MARK,
     MAX_PAYLOAD_BYTES,
     NOTE,
+    POSES_VERSION,
     RECEIVED,
     SENT,
-    VERSION,
     DamagedSpan,
     RecordingBlock,
     encode_block,
@@ -207,7 +207,7 @@ def test_another_file_is_refused_untouched(content: bytes, tmp_path: Path) -> No
     assert path.read_bytes() == content
 
 
-def newer_file(version: int = VERSION + 1) -> bytes:
+def newer_file(version: int = POSES_VERSION + 1) -> bytes:
     import struct
     import zlib
 
@@ -220,7 +220,7 @@ def test_a_newer_version_is_refused(tmp_path: Path) -> None:
     path.write_bytes(newer_file())
     for open_file in (RecordingWriter, read_recording):
         with pytest.raises(
-            BadFile, match=r"version 2; expected version 1 at most\. Use the newer version of the harness"
+            BadFile, match=r"version 3; expected version 2 at most\. Use the newer version of the harness"
         ):
             open_file(path)
     assert path.read_bytes() == newer_file()
@@ -289,7 +289,7 @@ def test_a_full_disk_is_reported() -> None:
 
 ENDLESS_WRITER = """
 import sys
-from harness.stream.is900.codec.reader import WireFormat
+from harness.stream.polhemus.codec.reader import WireFormat
 from harness.stream.recording.recording import RecordingWriter
 writer = RecordingWriter(sys.argv[1], {"source": "a test"})
 writer.on_configured(WireFormat(("head",), 40.0), 0.0, 0.0)

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from harness.errors import BadFile, BadInput
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.reader import ByteCapture, WireFormat
-from harness.stream.is900.codec.records import RecordFormat, RecordValues, encode_records
+from harness.stream.polhemus.codec.reader import ByteCapture, WireFormat
+from harness.stream.polhemus.codec.records import RecordFormat, RecordValues, encode_records
 from harness.stream.recording.blocks import (
     ANSWERED,
     CONFIGURED,

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from harness.core.arrays import Floats
 from harness.errors import BadFile, HarnessError
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.is900.codec.records import RecordValues, encode_records
+from harness.stream.polhemus.codec.reader import WireFormat
+from harness.stream.polhemus.codec.records import RecordValues, encode_records
 from harness.stream.recording.blocks import read_blocks
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream

@@ -74,9 +74,13 @@ def test_a_hidden_marker_of_four_changes_nothing_and_two_hide_the_body() -> None
 
 
 def test_the_residual_is_the_noise_of_the_markers() -> None:
-    note = truth_of_markers(Path("bar.c3d"), markers(names(4), noise_m=0.001), ["head"]).notes[0]
+    truth = truth_of_markers(Path("bar.c3d"), markers(names(4), noise_m=0.001), ["head"])
     # 12 coordinates of a frame less 6 of the pose
-    assert float(note.split("to ")[1].split(" mm")[0]) == pytest.approx(np.sqrt(3.0 * 0.5), rel=0.1)
+    assert float(truth.notes[0].split("to ")[1].split(" mm")[0]) == pytest.approx(np.sqrt(3.0 * 0.5), rel=0.1)
+    _, turn_rad = relative(truth.bodies["head"])
+    deviation_m, deviation_rad = truth.noise["head"]
+    assert deviation_m == pytest.approx(0.001 / np.sqrt(4.0), rel=0.1)
+    assert deviation_rad == pytest.approx(float(np.sqrt(np.mean(np.var(turn_rad, axis=0)))), rel=0.25)
 
 
 @pytest.mark.parametrize(

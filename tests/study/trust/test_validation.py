@@ -208,7 +208,7 @@ def test_stations_of_which_many_readings_were_left_out_are_named() -> None:
     quiet, noise = np.zeros((100, 3)), ErrorProcess(1e-3, 1e-3, 1.0)
     used = np.ones((100, 2), bool)
     used[:5] = False
-    head = StationResiduals(np.arange(100.0), quiet, quiet, np.ones(100, bool), used, (noise, noise, noise))
+    head = StationResiduals(1.0, np.arange(100.0), quiet, quiet, np.ones(100, bool), used, (noise, noise, noise))
     assert describe_left_out({"head": head}) == ()
     used[:21, 0] = False
     (said,) = describe_left_out({"head": head, "hand": replace(head, used=used)})

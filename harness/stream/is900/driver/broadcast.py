@@ -6,15 +6,16 @@ from collections import Counter
 import numpy as np
 
 from harness.errors import BadInput
-from harness.stream.is900.codec.datagram import DATAGRAM_FORMAT, DATAGRAM_LIST, Datagram, split_packets
-from harness.stream.is900.codec.items import STATION_CHARACTERS
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.is900.driver.configurator import MIN_RECORDS, estimate_rate_hz
-from harness.stream.is900.driver.connection import NoAnswer
-from harness.stream.is900.driver.stations import StationWatch
-from harness.stream.is900.driver.tracker import Tracker
-from harness.stream.is900.driver.transport import LineLost
+from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.line_events import LineEventKind, NullLineObserver
+from harness.stream.polhemus.codec.datagram import DATAGRAM_FORMAT, DATAGRAM_LIST, Datagram, split_packets
+from harness.stream.polhemus.codec.items import STATION_CHARACTERS
+from harness.stream.polhemus.codec.reader import WireFormat
+from harness.stream.polhemus.driver.connection import NoAnswer
+from harness.stream.polhemus.driver.rate import MIN_RECORDS, estimate_rate_hz
+from harness.stream.polhemus.driver.station_watch import StationWatch
+from harness.stream.polhemus.driver.tracker import Tracker
+from harness.stream.polhemus.driver.transport import LineLost
 
 _MIN_TIME_STEPS = 2
 """Fewest different stamps of a clock that counts. Where the time was not requested, the field may be constant."""
@@ -26,6 +27,9 @@ class Is900Broadcast(Tracker):
     Packets can be lost or doubled on a network; a station without a packet is an invalid row. `close` may be called
     from any thread. Raises BadInput when no packets arrive, or when the configuration needs commands.
     """
+
+    config: DriverConfig
+    _config_type = DriverConfig
 
     def _open(self) -> None:
         """Listen until the stations and their rate are known."""

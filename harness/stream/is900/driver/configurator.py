@@ -6,79 +6,25 @@ No setter is acknowledged (docs/is900.md 1).
 import re
 from dataclasses import replace
 
-import numpy as np
-
-from harness.core.arrays import Floats
 from harness.errors import BadInput
-from harness.stream.is900.codec import commands
-from harness.stream.is900.codec.capacity import check_capacity, required_bit_rate
-from harness.stream.is900.codec.commands import STREAM, station_command
-from harness.stream.is900.codec.decoder import Decoder, RecordRun
-from harness.stream.is900.codec.items import SINCE_FIRMWARE, missing_items
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.is900.codec.replies import OutputList, StatusRecord, SystemRecord, TrackingStatus
 from harness.stream.is900.driver.config import QUALITY_ITEMS, DriverConfig
-from harness.stream.is900.driver.connection import DeviceConnection
-from harness.stream.is900.driver.stations import StationSelection
-
-MIN_RECORDS = 3
-"""Fewest records of a station that give a rate."""
-PERIOD_QUANTILE = 0.1
-"""Quantile of the stamp differences that is taken as the period at first. Many rounds may be missing, but some pairs
-are adjacent [choice]."""
-MAX_INTERVAL_S = 10.0
-"""No two rounds are further apart [s] [choice]."""
-
-
-def measure_rate_hz(line: DeviceConnection, wire: WireFormat) -> float | None:
-    """Measure rounds per second from the device's stamps, or from the record count where there are none.
-
-    Returns None for too few records. The device is configured for this format, and stopped before and after.
-    """
-    line.send(STREAM)
-    data = line.listen(line.timing.measure_s)
-    line.stop()
-    runs = [event for event in _decoder(wire).feed(data) if isinstance(event, RecordRun)]
-    tables = [run.table[run.table["station"] == wire.characters[0]] for run in runs]
-    count = sum(map(len, tables))
-    if count < MIN_RECORDS:
-        return None
-    table = np.concatenate(tables)
-    if "time" in (table.dtype.names or ()):
-        rate_hz = estimate_rate_hz(table["time"].astype(float) * wire.settings.seconds_per_tick)
-        if rate_hz is not None:
-            return rate_hz
-    return count / line.timing.measure_s
-
-
-def estimate_rate_hz(stamps_s: Floats) -> float | None:
-    """Estimate rounds per second from the stamps (n,) [s] of one station; None for too few stamps.
-
-    Stamps may have jitter, be damaged or be missing. A short difference is about one period. The number of periods in
-    all differences is divided by their sum, in which the jitter of interior stamps cancels.
-    """
-    steps_s = np.diff(stamps_s)
-    steps_s = steps_s[(steps_s > 0.0) & (steps_s < MAX_INTERVAL_S)]  # other differences involve a damaged stamp
-    if len(steps_s) < MIN_RECORDS - 1:
-        return None
-    period_s = float(np.quantile(steps_s, PERIOD_QUANTILE))
-    for _ in range(2):  # the first estimate is a short period
-        period_s = float(np.median(steps_s / _count_periods(steps_s, period_s)))
-    return float(_count_periods(steps_s, period_s).sum() / steps_s.sum())
-
-
-def _count_periods(steps_s: Floats, period_s: float) -> Floats:
-    return np.maximum(np.rint(steps_s / period_s), 1.0)
-
-
-def _decoder(wire: WireFormat) -> Decoder:
-    return Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)
-
+from harness.stream.polhemus.codec import commands
+from harness.stream.polhemus.codec.capacity import check_capacity, required_bit_rate
+from harness.stream.polhemus.codec.commands import station_command
+from harness.stream.polhemus.codec.items import SINCE_FIRMWARE, missing_items
+from harness.stream.polhemus.codec.reader import WireFormat
+from harness.stream.polhemus.codec.replies import OutputList, StatusRecord, SystemRecord, TrackingStatus
+from harness.stream.polhemus.driver.connection import DeviceConnection
+from harness.stream.polhemus.driver.rate import (
+    check_requested_rate,
+    measure_rate_hz,
+    rates_agree,
+    too_few_records_error,
+)
+from harness.stream.polhemus.driver.stations import StationSelection
 
 SATURATED_SHARE = 0.95
 """A line that carries this share of its capacity may have dropped records [choice]."""
-RATE_TOLERANCE = 0.1
-"""Rates that differ by less than this share count as equal. `MP` rounds to whole numbers."""
 
 
 def select_items(port: str, status: StatusRecord, config: DriverConfig) -> tuple[int, ...]:
@@ -149,21 +95,12 @@ class DeviceConfigurator:
         """
         requested_hz, measured_hz = self._config.rate_hz, measure_rate_hz(self._line, wire)
         device_hz = measured_hz or reported_hz
-        if requested_hz and device_hz and not _rates_agree(requested_hz, device_hz):
-            raise BadInput(
-                f"Port {self._port}: a rate of {requested_hz:g} Hz is requested, "
-                f"but the device runs at {device_hz:.4g} Hz.",
-                "Omit the rate, or give that of the device.",
-            )
+        check_requested_rate(self._port, requested_hz, device_hz)
         for rate_hz in (requested_hz, reported_hz):
-            if rate_hz and (measured_hz is None or _rates_agree(rate_hz, measured_hz)):
+            if rate_hz and (measured_hz is None or rates_agree(rate_hz, measured_hz)):
                 return rate_hz
         if measured_hz is None:
-            raise BadInput(
-                f"Port {self._port}: the device does not report its rate, and sent too few records of station "
-                f"{chr(wire.characters[0])} in {self._line.timing.measure_s:g} s to measure it.",
-                "Check that this station is plugged in, or give the rate.",
-            )
+            raise too_few_records_error(self._port, self._line, wire)
         if reported_hz > measured_hz and self._is_saturated(len(wire.stations), measured_hz):
             return reported_hz
         return measured_hz
@@ -239,7 +176,3 @@ class DeviceConfigurator:
         if errors:
             return f"The device reported: {errors}."
         return "Switch it off and on, and check that no other program uses it."
-
-
-def _rates_agree(first_hz: float, second_hz: float) -> bool:
-    return abs(first_hz - second_hz) <= RATE_TOLERANCE * second_hz

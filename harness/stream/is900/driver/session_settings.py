@@ -11,9 +11,9 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.errors import BadInput
-from harness.stream.is900.codec import commands
-from harness.stream.is900.codec.commands import station_command
-from harness.stream.is900.codec.replies import (
+from harness.stream.polhemus.codec import commands
+from harness.stream.polhemus.codec.commands import station_command
+from harness.stream.polhemus.codec.replies import (
     GeometryReply,
     OutputList,
     ParsedReply,
@@ -23,7 +23,7 @@ from harness.stream.is900.codec.replies import (
     StatusRecord,
     SystemRecord,
 )
-from harness.stream.is900.driver.connection import DeviceConnection
+from harness.stream.polhemus.driver.connection import DeviceConnection
 
 Values = tuple[float, ...]
 _TOLERANCE = 1e-2

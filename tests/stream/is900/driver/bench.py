@@ -8,16 +8,19 @@ import numpy as np
 
 from harness.errors import BadInput
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.reader import WireFormat
-from harness.stream.is900.codec.samples import DeviceSamples
-from harness.stream.is900.driver.config import DriverConfig, DriverTiming
-from harness.stream.is900.driver.connection import Host
+from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
-from harness.stream.is900.driver.transport import LineLost, Transport
-from harness.stream.is900.emulator.config import EmulatorConfig
 from harness.stream.is900.emulator.emulator import Emulator
-from harness.stream.is900.emulator.faults import Fault
 from harness.stream.line_events import LineEvent
+from harness.stream.polhemus.codec.reader import WireFormat
+from harness.stream.polhemus.codec.samples import DeviceSamples
+from harness.stream.polhemus.driver.config import DriverTiming
+from harness.stream.polhemus.driver.connection import Host
+from harness.stream.polhemus.driver.tracker import Tracker
+from harness.stream.polhemus.driver.transport import LineLost, Transport
+from harness.stream.polhemus.emulator.config import EmulatorConfig
+from harness.stream.polhemus.emulator.emulator import LineEmulator
+from harness.stream.polhemus.emulator.faults import Fault
 
 NAMES = ("head", "torso", "left_wrist", "right_wrist", "left_ankle", "right_ankle")
 LOOP_S = 10.0
@@ -58,7 +61,7 @@ class EmulatedDevice:
     """The emulator as a device."""
 
     def __init__(self, samples: DeviceSamples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
-        self.emulator = Emulator(samples, config, now_s)
+        self.emulator: LineEmulator = Emulator(samples, config, now_s)
 
     def receive(self, data: bytes, now_s: float) -> None:
         self.emulator.receive(data, now_s)
@@ -190,7 +193,7 @@ class BenchLine:
             raise LineLost(self.name, "closed" if self._closed else "unplugged")
 
 
-def frames_for(stream: Is900, bench: Bench, duration_s: float) -> list[TrackerFrame]:
+def frames_for(stream: Tracker, bench: Bench, duration_s: float) -> list[TrackerFrame]:
     """Return the frames of this duration."""
     until_s = bench.now_s + duration_s
     frames: Iterator[TrackerFrame] = iter(stream)

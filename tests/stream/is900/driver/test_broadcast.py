@@ -17,16 +17,18 @@ import pytest
 from harness.cli import main
 from harness.errors import BadInput
 from harness.experiment import prepare_playback
-from harness.stream.is900.codec.datagram import Datagram, parse_datagram
-from harness.stream.is900.codec.samples import DeviceSamples
 from harness.stream.is900.driver.broadcast import Is900Broadcast
-from harness.stream.is900.driver.config import DriverConfig, DriverTiming
+from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import open_tracker
-from harness.stream.is900.driver.transport import open_transport
-from harness.stream.is900.emulator.config import EmulatorConfig
-from harness.stream.is900.emulator.server import EmulatorServer, serve_emulator
-from harness.stream.is900.emulator.udp_broadcast import parse_udp_address
+from harness.stream.is900.emulator.emulator import serve_emulator
 from harness.stream.line_events import LineEvent
+from harness.stream.polhemus.codec.datagram import Datagram, parse_datagram
+from harness.stream.polhemus.codec.samples import DeviceSamples
+from harness.stream.polhemus.driver.config import DriverTiming
+from harness.stream.polhemus.driver.transport import open_transport
+from harness.stream.polhemus.emulator.config import EmulatorConfig
+from harness.stream.polhemus.emulator.server import EmulatorServer
+from harness.stream.polhemus.emulator.udp_broadcast import parse_udp_address
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
 from harness.testing.stream_checks import check_stream
@@ -266,7 +268,7 @@ def test_other_computers_are_excluded_by_default() -> None:
 
 def test_a_device_without_time_stamps_is_read_by_the_hosts_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     """The time may be absent or constant where it was not requested (docs/is900.md 9)."""
-    from harness.stream.is900.emulator import udp_broadcast
+    from harness.stream.polhemus.emulator import udp_broadcast
 
     original = Datagram
     for time_s in (None, 0.0):

@@ -9,11 +9,12 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.errors import BadInput, UnknownName
-from harness.stream.is900.codec.items import BAUD_RATES, SHORT_LIST, STANDARD_LIST, record_size
-from harness.stream.is900.codec.replies import StatusRecord
-from harness.stream.is900.driver.config import DriverConfig, DriverTiming
-from harness.stream.is900.driver.configurator import estimate_rate_hz
+from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
+from harness.stream.polhemus.codec.items import BAUD_RATES, SHORT_LIST, STANDARD_LIST, record_size
+from harness.stream.polhemus.codec.replies import StatusRecord
+from harness.stream.polhemus.driver.config import DriverTiming
+from harness.stream.polhemus.driver.rate import estimate_rate_hz
 from tests.stream.is900.driver.bench import (
     NAMES,
     Bench,

@@ -15,12 +15,14 @@ import pytest
 
 from harness.errors import BadInput
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.driver.config import DriverConfig, DriverTiming
+from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
-from harness.stream.is900.emulator.config import EmulatorConfig
-from harness.stream.is900.emulator.faults import Fault
-from harness.stream.is900.emulator.server import EmulatorServer, serve_emulator
+from harness.stream.is900.emulator.emulator import serve_emulator
 from harness.stream.line_events import LineEvent
+from harness.stream.polhemus.driver.config import DriverTiming
+from harness.stream.polhemus.emulator.config import EmulatorConfig
+from harness.stream.polhemus.emulator.faults import Fault
+from harness.stream.polhemus.emulator.server import EmulatorServer
 from harness.testing.stream_checks import check_stream
 from tests.interrupts import heeding_interrupts
 from tests.stream.is900.driver.bench import make_samples

@@ -12,12 +12,12 @@ import pytest
 from harness.core import rotations
 from harness.errors import BadInput
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.codec.records import from_yaw_pitch_roll_deg, yaw_pitch_roll_deg
-from harness.stream.is900.codec.replies import parse_reply
 from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.session_settings import STATION_SETTINGS
-from harness.stream.is900.emulator.config import EmulatorConfig
-from harness.stream.is900.emulator.faults import Fault
+from harness.stream.polhemus.codec.records import from_yaw_pitch_roll_deg, yaw_pitch_roll_deg
+from harness.stream.polhemus.codec.replies import parse_reply
+from harness.stream.polhemus.emulator.config import EmulatorConfig
+from harness.stream.polhemus.emulator.faults import Fault
 from tests.stream.is900.driver.bench import LOOP_S, START_S, Bench, EmulatedDevice, frames_for, make_samples
 
 STATIONS = 2

@@ -12,14 +12,15 @@ from harness.core.seeds import generator
 from harness.experiment.scenarios import load_scenario
 from harness.stream.frame import TrackerFrame
 from harness.stream.host_clock import HostClockEstimator
-from harness.stream.is900.codec.commands import station_command
-from harness.stream.is900.codec.items import SHORT_LIST
-from harness.stream.is900.codec.reader import ContinuousFrameReader
-from harness.stream.is900.driver.config import DriverConfig, DriverTiming
+from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
-from harness.stream.is900.emulator.config import EmulatorConfig
-from harness.stream.is900.emulator.faults import ByteFaultKind, Fault
 from harness.stream.line_events import LineEvent
+from harness.stream.polhemus.codec.commands import station_command
+from harness.stream.polhemus.codec.items import SHORT_LIST
+from harness.stream.polhemus.codec.reader import ContinuousFrameReader
+from harness.stream.polhemus.driver.config import DriverTiming
+from harness.stream.polhemus.emulator.config import EmulatorConfig
+from harness.stream.polhemus.emulator.faults import ByteFaultKind, Fault
 from tests.stream.is900.driver.bench import (
     START_S,
     Adapter,

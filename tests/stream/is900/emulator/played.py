@@ -7,10 +7,11 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.stream.is900.codec.replies import Emitter
-from harness.stream.is900.codec.samples import MAX_RANGES, DeviceSamples, FilterSamples
-from harness.stream.is900.emulator.config import EmulatorConfig
 from harness.stream.is900.emulator.device import Device
+from harness.stream.polhemus.codec.replies import Emitter
+from harness.stream.polhemus.codec.samples import MAX_RANGES, DeviceSamples, FilterSamples
+from harness.stream.polhemus.emulator.config import EmulatorConfig
+from harness.stream.polhemus.emulator.device import CommandDevice
 
 NAMES = (
     *("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head"),
@@ -92,7 +93,7 @@ class DeviceSession:
         quaternion: Floats | None = None,
         samples: DeviceSamples | None = None,
     ) -> None:
-        self.device = Device(samples or make_samples(stations, quaternion=quaternion), config, 0.0)
+        self.device: CommandDevice = Device(samples or make_samples(stations, quaternion=quaternion), config, 0.0)
         self.now_s = 0.0
 
     def send(self, data: bytes, after_s: float = 0.0) -> bytes:

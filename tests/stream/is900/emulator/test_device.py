@@ -6,11 +6,11 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadInput
-from harness.stream.is900.codec.items import record_type
-from harness.stream.is900.codec.records import from_yaw_pitch_roll_deg, yaw_pitch_roll_deg
-from harness.stream.is900.emulator.config import EmulatorConfig
 from harness.stream.is900.emulator.device import Device
-from harness.stream.is900.emulator.settings import STATION_NAMES
+from harness.stream.polhemus.codec.items import record_type
+from harness.stream.polhemus.codec.records import from_yaw_pitch_roll_deg, yaw_pitch_roll_deg
+from harness.stream.polhemus.emulator.config import EmulatorConfig
+from harness.stream.polhemus.emulator.settings import STATION_NAMES
 from tests.stream.is900.emulator.played import DeviceSession, make_samples
 
 SET_UP = b"O1,40,2,11,21,1\rO2,40,2,11,21,1\rO3,40,2,11,21,1\rO4,40,2,11,21,1\rfu"

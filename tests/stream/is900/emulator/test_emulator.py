@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from harness.simulate import TrackerConfig, transmit
-from harness.stream.is900.emulator.device_state import Message
-from harness.stream.is900.emulator.emulator import MAX_QUEUED_REPLIES, SerialLine
+from harness.stream.polhemus.emulator.device_state import Message
+from harness.stream.polhemus.emulator.emulator import MAX_QUEUED_REPLIES, SerialLine
 
 RECORD = bytes(38)
 

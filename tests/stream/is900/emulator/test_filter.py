@@ -8,14 +8,14 @@ import pytest
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.stream.is900.codec.datagram import parse_datagram
-from harness.stream.is900.codec.items import record_size, record_type
-from harness.stream.is900.codec.records import RecordFormat, RecordValues, encode_records, yaw_pitch_roll_deg
-from harness.stream.is900.codec.replies import TrackingStatus, parse_reply
-from harness.stream.is900.codec.samples import DeviceSamples, FilterSamples
-from harness.stream.is900.emulator.config import EmulatorConfig
-from harness.stream.is900.emulator.settings import DEFAULT_EMITTERS
-from harness.stream.is900.emulator.udp_broadcast import UdpBroadcast
+from harness.stream.polhemus.codec.datagram import parse_datagram
+from harness.stream.polhemus.codec.items import record_size, record_type
+from harness.stream.polhemus.codec.records import RecordFormat, RecordValues, encode_records, yaw_pitch_roll_deg
+from harness.stream.polhemus.codec.replies import TrackingStatus, parse_reply
+from harness.stream.polhemus.codec.samples import DeviceSamples, FilterSamples
+from harness.stream.polhemus.emulator.config import EmulatorConfig
+from harness.stream.polhemus.emulator.settings import DEFAULT_EMITTERS
+from harness.stream.polhemus.emulator.udp_broadcast import UdpBroadcast
 from tests.stream.is900.emulator.played import FILTER_EMITTERS, DeviceSession, make_samples, with_filter
 
 ITEMS = (40, 2, 11, 1)

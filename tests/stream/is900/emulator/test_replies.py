@@ -2,9 +2,9 @@
 
 import pytest
 
-from harness.stream.is900.codec.replies import TrackingStatus
-from harness.stream.is900.emulator.config import EmulatorConfig
 from harness.stream.is900.emulator.setting_commands import SET_ONLY_COMMANDS, SETTER_COMMANDS
+from harness.stream.polhemus.codec.replies import TrackingStatus
+from harness.stream.polhemus.emulator.config import EmulatorConfig
 from tests.stream.is900.emulator.played import DeviceSession
 
 STATES = b"21l" + b"1111" + b"0" * 28 + b"\r\n"

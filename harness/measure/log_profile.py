@@ -1,0 +1,169 @@
+"""Profile of a pose log: what the poses of another program show of their source without a reference."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats
+from harness.core.number_format import Interval
+from harness.core.progress import ProgressCallback
+from harness.errors import BadInput
+from harness.measure.episode_fit import EpisodeFit
+from harness.measure.log_series import PAUSE_S, EvenSeries, even_series, find_repeats, neighbour_noise
+from harness.measure.noise_fit import NoiseFit
+from harness.measure.profile import (
+    STATIC_CORRELATIONS,
+    Bar,
+    CollectedReadings,
+    StretchLength,
+    UnitProfile,
+    fit_rest,
+    require_pair,
+    without_rest,
+)
+from harness.measure.sampling import LOST_STEP, describe_sampling, mean_period_s
+from harness.measure.timing import TIMING_KEYS, TimingMeasurement, count_share
+from harness.stream import BodyPoses, PoseLog
+from harness.stream.recording import StationReadings
+
+_FEWEST = 20
+"""Fewest poses of a body that are measured."""
+_MOST_REPEATS = 0.5
+"""Share of repeats from which on they show the resolution of a body at rest, and are kept [choice]."""
+_NO_REST = "No body rests for 5 s."
+_NO_HOST = "A file of poses has no clock of a host."
+
+
+def measure_log_profile(
+    log: PoseLog,
+    *,
+    bar: Bar | None = None,
+    progress: ProgressCallback = lambda step, done, planned: None,
+) -> UnitProfile:
+    """Measure the source of a pose log, at rest or moving.
+
+    Noise and episodes are those of rests, at an even rate. A moving body shows its timing, and a bound of its noise.
+    BadInput for bodies of `bar` that are not in it, and without a body of 20 poses.
+    """
+    require_pair(bar, log.names)
+    bodies = [body for body in log.bodies if len(body.times_s) >= _FEWEST]
+    if not bodies:
+        raise BadInput(f"{log.source} has no body with {_FEWEST} poses.", "Record for longer.")
+    repeats = {body.name: find_repeats(body) for body in bodies}
+    kept = {name: ~same if same.mean() < _MOST_REPEATS else np.ones(len(same), bool) for name, same in repeats.items()}
+    series = {body.name: even_series(body, kept[body.name]) for body in bodies}
+    rate_hz = round(1.0 / mean_period_s([body.times_s for body in bodies]), 3)
+    collected = CollectedReadings(rate_hz, bar)
+    for name, even in series.items():
+        for part in even.parts:
+            collected.add_rest(name, part, even.rate_hz)
+    if bar:
+        collected.add_motion({body.name: _raw(body, kept[body.name]) for body in bodies})
+    unseen = [body.name for body in log.bodies if body not in bodies]
+    notes = [f"{name}: fewer than {_FEWEST} poses, not measured." for name in unseen]
+    for body in bodies:
+        notes += _describe(body, kept[body.name], series[body.name])
+    noise, episodes = _fit(collected, notes, progress)
+    return UnitProfile(
+        tuple(body.name for body in bodies),
+        rate_hz,
+        (),
+        {"source": "poses"},
+        (StretchLength("", log.duration_s, sum(len(body.times_s) for body in bodies)),),
+        (),
+        0,
+        _timing(bodies, repeats),
+        noise,
+        episodes,
+        (),
+        collected.rigid_pair(),
+        tuple(collected.places),
+        (*notes, *collected.limits()),
+    )
+
+
+def _fit(collected: CollectedReadings, notes: list[str], progress: ProgressCallback) -> tuple[NoiseFit, EpisodeFit]:
+    """Noise and episodes of the rests; missing without one, and where rests are too short for the correlation."""
+    reason = _NO_REST
+    if collected.rest:
+        try:
+            noise, episodes = fit_rest(collected.rest, progress)
+        except BadInput as short:
+            reason = short.what
+        else:
+            correlation = noise.all_stations["components.drift.correlation_s"]
+            longest_s = max(one.duration_s for one in collected.rest)
+            if correlation.is_measured and longest_s < STATIC_CORRELATIONS * correlation.value:
+                notes.append(
+                    f"Errors are correlated over {correlation.value:.3g} s; the longest rest of {longest_s:.3g} s is "
+                    f"shorter than {STATIC_CORRELATIONS:g} times that: rest for longer."
+                )
+            return noise, episodes
+    return without_rest(reason)
+
+
+def _raw(body: BodyPoses, kept: Bools) -> StationReadings:
+    time_s = body.times_s[kept]
+    count = len(time_s)
+    return StationReadings(
+        time_s, time_s, time_s, body.positions_m[kept], body.quaternions[kept], np.ones(count), np.zeros(count, bool)
+    )
+
+
+def _describe(body: BodyPoses, kept: Bools, series: EvenSeries) -> list[str]:
+    """How the poses of a body come, what was left out for an even rate, and the bound of its noise."""
+    out = [describe_sampling(body.name, body.times_s)]
+    if not kept.all():
+        out.append(
+            f"{body.name}: {100.0 * np.mean(~kept):.1f} % of the poses repeat the one before, and were left out."
+        )
+    if series.left_out > 0.0:
+        out.append(
+            f"{body.name}: noise at rest is that of the nearest poses at an even {series.rate_hz:.3g} Hz, without "
+            f"{100.0 * series.left_out:.1f} % of the poses."
+        )
+    place_m, turn_rad = neighbour_noise(body, kept)
+    if math.isfinite(place_m):
+        out.append(
+            f"{body.name}: from one pose to the next noise is at most {1e3 * place_m:.3g} mm and "
+            f"{math.degrees(turn_rad):.3g} deg on each axis."
+        )
+    return out
+
+
+def _timing(bodies: list[BodyPoses], repeats: Mapping[str, Bools]) -> TimingMeasurement:
+    by_station = {body.name: _numbers([body], repeats) for body in bodies}
+    resolution_s = min(_resolution_s(body.times_s) for body in bodies)
+    together = _numbers(bodies, repeats)
+    together["timing.stamp_resolution_s"] = Interval(resolution_s, resolution_s, resolution_s, len(bodies))
+    missing = Interval.missing(_NO_HOST)
+    return TimingMeasurement({key: together.get(key, missing) for key in TIMING_KEYS}, by_station, resolution_s)
+
+
+def _numbers(bodies: list[BodyPoses], repeats: Mapping[str, Bools]) -> dict[str, Interval]:
+    """Rate of a body, standard deviation of its steps, lost and repeated poses, over bodies of one source."""
+    steps = [step_s[step_s < PAUSE_S] for body in bodies for step_s in [np.diff(body.times_s)]]
+    singles = [step_s[step_s < LOST_STEP * np.median(step_s)] for step_s in steps]
+    due = [float(np.sum(all_s) / np.mean(one_s)) for all_s, one_s in zip(steps, singles, strict=True)]
+    lost = sum(max(round(one) - len(step_s), 0) for one, step_s in zip(due, steps, strict=True))
+    count = sum(map(len, singles))
+    period_s = mean_period_s([body.times_s for body in bodies])
+    jitter_s = float(np.sqrt(np.mean(np.concatenate([one - one.mean() for one in singles]) ** 2)))
+    doubt = jitter_s / math.sqrt(count) / period_s
+    twice = sum(int(repeats[body.name].sum()) for body in bodies)
+    return {
+        "timing.rate_hz": Interval.normal(1.0 / period_s, doubt / period_s, count),
+        "timing.jitter_s": Interval.normal(jitter_s, jitter_s / math.sqrt(2.0 * count), count, least=0.0),
+        "timing.lost_share": count_share(lost, lost + sum(map(len, steps))),
+        "timing.duplicate_share": count_share(twice, sum(len(body.times_s) for body in bodies)),
+    }
+
+
+def _resolution_s(time_s: Floats) -> float:
+    """The largest power of ten that divides every step of rising times (N,) [s], down to a nanosecond."""
+    for digits in range(0, 9):
+        ticks = np.diff(time_s) * 10.0**digits
+        if np.abs(ticks - np.rint(ticks)).max() < 1e-3:
+            return float(10.0**-digits)
+    return 1e-9

@@ -1,0 +1,13 @@
+"""The Polhemus FASTRAK: the driver of a device, and an emulator of one (docs/device.md, FASTRAK)."""
+
+from typing import TYPE_CHECKING
+
+from harness.core.door import lazy_names
+
+if TYPE_CHECKING:
+    from harness.stream.fastrak.driver import Fastrak, FastrakConfig
+    from harness.stream.fastrak.emulator import FastrakEmulator, FastrakEmulatorConfig, serve_fastrak
+else:
+    __getattr__, __dir__ = lazy_names(__name__)
+
+__all__ = ["Fastrak", "FastrakConfig", "FastrakEmulator", "FastrakEmulatorConfig", "serve_fastrak"]

@@ -1,0 +1,112 @@
+"""An emulated FASTRAK with its line, and its service at a port (docs/device.md, FASTRAK)."""
+
+import contextlib
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import ClassVar
+
+from harness.errors import BadInput
+from harness.stream.fastrak.items import FASTRAK_ITEMS, FASTRAK_LIST
+from harness.stream.polhemus.codec.items import FAMILY_STATIONS, MOST_DEVICE_HZ
+from harness.stream.polhemus.codec.replies import ParsedReply, StatusRecord
+from harness.stream.polhemus.codec.samples import DeviceSamples
+from harness.stream.polhemus.emulator.argument import UNKNOWN_COMMAND, CommandArgument, CommandError
+from harness.stream.polhemus.emulator.config import EmulatorConfig
+from harness.stream.polhemus.emulator.device import IMMEDIATE_COMMANDS, CommandDevice, CommandTable, boresight_station
+from harness.stream.polhemus.emulator.device_state import DeviceState
+from harness.stream.polhemus.emulator.emulator import LineEmulator
+from harness.stream.polhemus.emulator.server import EmulatorServer, SentCallback, open_port, serve_in_thread
+from harness.stream.polhemus.emulator.setting_commands import (
+    STATION_QUERIES,
+    STATION_RESETS,
+    STATION_SETTERS,
+    no_change,
+)
+from harness.stream.polhemus.emulator.settings import DeviceSettings
+
+
+@dataclass(frozen=True)
+class FastrakEmulatorConfig(EmulatorConfig):
+    """Properties of the emulated device and line. Raises BadInput for impossible ones."""
+
+    firmware: str = "3.02"
+    identification: str = "OutputCompensat CPG2030-003-10"
+    """Text of the status record: the default of the command `X` in the manual."""
+    tagged: bool = False
+    """Whether the status record has the tag `F3` and the map of the receivers, as the manual of 2012 says; VR Juggler
+    refuses it."""
+    known_items: ClassVar[frozenset[int]] = FASTRAK_ITEMS
+    usual_items: ClassVar[tuple[int, ...]] = FASTRAK_LIST
+    known_stations: ClassVar[str] = FAMILY_STATIONS["fastrak"].decode()
+    fastrak: ClassVar[bool] = True
+
+
+def _ignore(device: DeviceState, now_s: float) -> None:
+    """Compensation (`D`, `d`) changes no pose here: the samples have none."""
+
+
+_WITHOUT_EFFECT = ("I", "Q", "r")
+"""Increment, limits of angles, mounting of the transmitter: taken, not stored, so that they cannot be read."""
+
+
+def _refuse_query(settings: DeviceSettings, argument: CommandArgument) -> Iterable[ParsedReply]:
+    raise CommandError(UNKNOWN_COMMAND)
+
+
+class FastrakDevice(CommandDevice):
+    """A FASTRAK that plays samples and executes commands. The same bytes at the same times give the same answers."""
+
+    config_type = FastrakEmulatorConfig
+    commands: ClassVar[CommandTable] = CommandTable(
+        actions={
+            "B": lambda device, argument, now_s: boresight_station(device, argument, now_s, True),
+        },
+        setters={**STATION_SETTERS, **dict.fromkeys(_WITHOUT_EFFECT, no_change)},
+        set_only={**STATION_RESETS, "e": no_change, "y": no_change},
+        queries={**STATION_QUERIES, **dict.fromkeys(_WITHOUT_EFFECT, _refuse_query)},
+        immediate={**IMMEDIATE_COMMANDS, "D": _ignore, "d": _ignore},
+    )
+
+    def status_record(self) -> StatusRecord:
+        """Return the reply to `S`, with the map of the receivers that are plugged in where it is tagged."""
+        status = replace(super().status_record(), blank=False)
+        if not (isinstance(self.config, FastrakEmulatorConfig) and self.config.tagged):
+            return status
+        plugged = sum(1 << self.config.known_stations.index(name) for name in self.rounds.station_characters)
+        return replace(status, tag=f"F3{plugged:X}")
+
+
+class FastrakEmulator(LineEmulator):
+    """A FASTRAK and the line as a host sees them. Calls must have increasing times."""
+
+    def __init__(self, samples: DeviceSamples, config: FastrakEmulatorConfig | None = None, now_s: float = 0.0) -> None:
+        """Switch the device on. Raises BadInput for samples that no FASTRAK can have, UnknownName for a fault's
+        station that is not in them.
+        """
+        limit_hz = MOST_DEVICE_HZ["fastrak"] / len(samples.stations)
+        if samples.rate_hz > 1.001 * limit_hz:
+            raise BadInput(
+                f"A FASTRAK with {len(samples.stations)} stations at {samples.rate_hz:g} Hz.",
+                f"It sends {MOST_DEVICE_HZ['fastrak']:g} records per second in total: give at most {limit_hz:g} Hz.",
+            )
+        super().__init__(FastrakDevice(samples, config, now_s), now_s)
+
+
+@contextlib.contextmanager
+def serve_fastrak(
+    samples: DeviceSamples,
+    config: FastrakEmulatorConfig | None = None,
+    *,
+    pty: Path | str | None = None,
+    tcp: str | None = None,
+    on_sent: SentCallback | None = None,
+) -> Iterator[EmulatorServer]:
+    """Play samples as a FASTRAK at a pty behind a link, or at `host:port`, while the block runs.
+
+    `on_sent` receives each record and reply that was written, with its times and damage, in the emulator's thread.
+    """
+    emulator = FastrakEmulator(samples, config, time.monotonic())
+    with serve_in_thread(EmulatorServer(emulator, open_port(pty, tcp), on_sent)) as server:
+        yield server

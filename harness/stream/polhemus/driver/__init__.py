@@ -1,0 +1,1 @@
+"""What drivers of trackers share: transports, the exchange over a line, the stations, the watchdog."""

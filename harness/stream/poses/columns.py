@@ -1,0 +1,259 @@
+"""Which columns of a table are time, position and quaternion of which body."""
+
+import re
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from harness.core.units import LENGTH_UNITS_M, TIME_UNITS_S, find_unit
+from harness.errors import BadFile
+from harness.stream.poses.column_names import AXES, ColumnName, parse_column_name
+from harness.stream.poses.number_table import TableHead
+from harness.stream.poses.pose_log import FileFinding
+
+EXPECTED_COLUMNS = "columns of a time, a position and a quaternion"
+NORM_TOLERANCE = 0.01
+"""Largest deviation of a quaternion's norm from 1."""
+_ADVICE = "Name the columns in their order, - for others: --columns time,x,y,z,qx,qy,qz,qw."
+_LABELS = {"id", "parent", "asset id"}
+"""First words of header lines that name neither bodies nor columns."""
+_QUATERNION = ("w", "x", "y", "z")
+_RATES = ("export frame rate", "capture frame rate", "objects", "segments")
+"""Names of the rate in the headers of OptiTrack's and Vicon's programs."""
+
+
+@dataclass(frozen=True)
+class BodyColumns:
+    """Columns of one body, from 0."""
+
+    name: str
+    """"" where the file does not name it."""
+    position: tuple[int, ...]
+    """(3,) x, y, z."""
+    quaternion: tuple[int, ...]
+    """(4,) components in the order in which they stand in the file."""
+
+
+@dataclass(frozen=True)
+class TableColumns:
+    """The meaning of the columns of a table."""
+
+    bodies: tuple[BodyColumns, ...]
+    time: int | None
+    frame: int | None
+    """Column of the number of the sample."""
+    body: int | None
+    """Column of the name or number of the body in each row."""
+    nanoseconds: int | None = None
+    """Column of nanoseconds that are added to the whole seconds of `time`."""
+    text_time: str = ""
+    """Name of a column of times that are written as text; "" if there is none."""
+    time_unit: str = ""
+    """Unit that the header states; "" if none."""
+    length_unit: str = ""
+    rate_hz: float | None = None
+    """Rate that the header states [Hz]."""
+    order: str = ""
+    """Order of a quaternion's components in the file, such as "xyzw"; "" where no names tell it."""
+    order_reason: str = ""
+    motive: bool = False
+    """Whether OptiTrack's program wrote the file."""
+    findings: tuple[FileFinding, ...] = ()
+
+
+def find_columns(head: TableHead, names: Sequence[str] | None = None) -> TableColumns:
+    """Conclude the meaning of the columns from `names`, the header, or the numbers. Raises BadFile."""
+    if names is not None:
+        if len(names) > head.columns:
+            found = f"{head.columns} columns, where --columns names {len(names)}"
+            raise BadFile(head.path, found, "no more names than columns", _ADVICE)
+        paths = [(name,) for name in (*names, *["-"] * (head.columns - len(names)))]
+        return _from_names(head, paths, "given by --columns", {})
+    facts = _facts(head.header)
+    if facts.get("rotation type", "quaternion").lower() != "quaternion":
+        found = f"rotations of the type {facts['rotation type']}"
+        raise BadFile(head.path, found, "quaternions", "Export with the rotation type Quaternion.")
+    rows = [row for row in (_fit(row, head.columns) for row in head.header) if row]
+    scores = [sum(parse_column_name([cell]).kind != "" for cell in row) for row in rows]
+    best = max(range(len(rows)), key=lambda n: (scores[n], n), default=None)
+    if best is None or scores[best] < min(6, head.columns):
+        return _from_numbers(head)
+    above = [_spread(row) for row in rows[:best] if _is_context(row)]
+    cells = [(*(row[c] for row in above), rows[best][c]) for c in range(head.columns)]
+    units = rows[best + 1] if best + 1 < len(rows) else ("",) * head.columns
+    return _from_names(head, cells, "the header's names", facts, units)
+
+
+def _fit(row: Sequence[str], columns: int) -> tuple[str, ...]:
+    """A header line with a cell for each column; empty for a line that has more, or far fewer."""
+    cells = list(row)
+    if len(cells) != columns:
+        words = re.split(r"[\s,;]+", " ".join(row).strip())
+        cells = words if len(words) == columns else cells
+    if len(cells) > columns or len(cells) < 2:
+        return ()
+    return (*cells, *[""] * (columns - len(cells)))
+
+
+def _is_context(row: Sequence[str]) -> bool:
+    """Whether a header line may name bodies or the kind of the columns below: nothing stands over the first one."""
+    label = next((cell.lower() for cell in row if cell), "")
+    return bool(label) and not row[0] and label not in _LABELS
+
+
+def _spread(row: Sequence[str]) -> list[str]:
+    """The cells of a line; where most are empty, each one counts for those that follow."""
+    cells = list(row)
+    if sum(map(bool, cells)) < len(cells) / 3:
+        for c in range(1, len(cells)):
+            cells[c] = cells[c] or cells[c - 1]
+    return [":".join(dict.fromkeys(cell.split(":"))) for cell in cells]
+
+
+def _facts(header: Sequence[Sequence[str]]) -> dict[str, str]:
+    """Names and values of header lines such as `Length Units,Meters`, or of two lines with a cell each."""
+    filled = [[cell for cell in row if cell] for row in header]
+    pairs = [pair for row in header for pair in pairwise(row)]
+    pairs += [(a[0], b[0]) for a, b in pairwise(filled) if len(a) == len(b) == 1]
+    return {name.lower(): value for name, value in pairs if name and value}
+
+
+@dataclass
+class _Group:
+    """Columns of one body while they are collected."""
+
+    name: str
+    family: str
+    columns: dict[str, int] = field(default_factory=dict)
+
+
+def _from_names(
+    head: TableHead,
+    paths: Sequence[Sequence[str]],
+    source: str,
+    facts: Mapping[str, str],
+    units: Sequence[str] = (),
+) -> TableColumns:
+    names = [parse_column_name(path) if path[-1] != "-" else ColumnName("") for path in paths]
+    groups: dict[str, list[_Group]] = {"position": [], "quaternion": []}
+    for c, name in enumerate(names):
+        if name.kind in groups and c not in head.text_columns:
+            same = [group for group in groups[name.kind] if (group.name, group.family) == (name.body, name.family)]
+            free = next((group for group in same if name.axis not in group.columns), None)
+            if free is None:
+                groups[name.kind].append(free := _Group(name.body, name.family))
+            free.columns[name.axis] = c
+    places = [group for group in groups["position"] if set(group.columns) == set(AXES)]
+    turns = [group for group in groups["quaternion"] if set(group.columns) == set(_QUATERNION)]
+    bodies = _pair(places, turns)
+    if not bodies:
+        raise _missing(head.path, names, paths, bool(places), bool(turns))
+    chosen = [c for body in bodies for c in (*body.position, *body.quaternion)]
+    time, frame = _first(names, "time", head.text_columns), _first(names, "frame", head.text_columns)
+    numbered = any(names[c].numbered for c in chosen)
+    lengths = {names[c].unit or _unit_of(units, c, LENGTH_UNITS_M) for body in bodies for c in body.position}
+    lengths.add(next((find_unit(facts[key], LENGTH_UNITS_M) for key in ("length units", "units") if key in facts), ""))
+    rate = next((facts[key] for key in _RATES if key in facts), "")
+    text = ", ".join("/".join(filter(None, paths[c])) for c in sorted(chosen[:7]))
+    text = text if time is None else f"{paths[time][-1]}, {text}"
+    return TableColumns(
+        bodies,
+        time,
+        frame,
+        _first(names, "body") if len(bodies) == 1 else None,
+        None if time is None else _first(names, "nanoseconds", head.text_columns),
+        next((paths[c][-1] for c in sorted(head.text_columns) if names[c].kind == "time"), ""),
+        "" if time is None else names[time].unit or _unit_of(units, time, TIME_UNITS_S),
+        max(lengths),
+        float(rate) if re.fullmatch(r"\d+(\.\d+)?", rate) and float(rate) > 0.0 else None,
+        "".join(names[c].axis for c in bodies[0].quaternion),
+        "q0 is the real part in most programs" if numbered else source,
+        "format version" in facts and "take name" in facts,
+        (FileFinding("columns", text + (", ..." if len(bodies) > 1 else ""), source),),
+    )
+
+
+def _pair(places: Sequence[_Group], turns: Sequence[_Group]) -> tuple[BodyColumns, ...]:
+    """Positions and quaternions of the same body; those of the only body may have different names."""
+    pairs = [(place, turn) for place, turn in zip(places, turns, strict=False) if place.name == turn.name]
+    if len(places) == len(turns) == 1:
+        pairs = [(places[0], turns[0])]
+    elif len(pairs) < max(len(places), len(turns)):
+        by_name = {turn.name: turn for turn in turns}
+        pairs = [(place, by_name[place.name]) for place in places if place.name in by_name]
+    return tuple(
+        BodyColumns(
+            place.name or turn.name,
+            tuple(place.columns[axis] for axis in AXES),
+            tuple(sorted(turn.columns.values())),
+        )
+        for place, turn in pairs
+    )
+
+
+def _missing(
+    path: Path, names: Sequence[ColumnName], paths: Sequence[Sequence[str]], has_place: bool, has_turn: bool
+) -> BadFile:
+    angles = [p[-1] for name, p in zip(names, paths, strict=True) if name.kind == "angle" or name.family == "r"]
+    if has_place and not has_turn and angles:
+        found = f"angles ({', '.join(angles[:6])}) of a convention that the file does not name"
+        return BadFile(path, found, "quaternions or matrices", "Export quaternions.")
+    lacks = "position" if not has_place else "quaternion" if not has_turn else "body with both of them"
+    shown = ", ".join("/".join(filter(None, path)) for path in paths[:12])
+    return BadFile(path, f"no {lacks} among the columns {shown}", EXPECTED_COLUMNS, _ADVICE)
+
+
+def _first(names: Sequence[ColumnName], kind: str, without: Container[int] = ()) -> int | None:
+    """The first column of a kind; of times the device's own."""
+    found = [c for c, name in enumerate(names) if name.kind == kind and c not in without]
+    order = {"measured": 0, "stamp": 1, "received": 3}
+    return min(found, key=lambda c: (order.get(names[c].axis, 2), c), default=None)
+
+
+def _unit_of(units: Sequence[str], column: int, known: dict[str, float]) -> str:
+    return find_unit(units[column], known) if column < len(units) else ""
+
+
+def _from_numbers(head: TableHead) -> TableColumns:
+    """Columns of a table without names: four of norm 1 are a quaternion, three beside them the position."""
+    number = [c for c in range(head.columns) if c not in head.text_columns]
+    lead, count = len(number) % 7, len(number) // 7
+    for before, bodies in ((lead, count), (1, 1), (0, 1), (2, 1)):  # columns before the poses, and bodies
+        starts = [number[before + 7 * n : before + 7 * n + 7] for n in range(bodies)]
+        for position, quaternion in ((slice(0, 3), slice(3, 7)), (slice(4, 7), slice(0, 4))):
+            if before <= 2 and starts and all(_has_norm_1(head, start[quaternion]) for start in starts):
+                found = tuple(BodyColumns("", tuple(s[position]), tuple(s[quaternion])) for s in starts)
+                return _without_names(head, number[:before], found)
+    what = f"no four columns of norm 1 where a quaternion may stand, in {head.form}"
+    if len(number) < 7:
+        what = f"rows of {len(number)} numbers, where a pose has 7, or 12 in a matrix"
+    raise BadFile(head.path, what, EXPECTED_COLUMNS, _ADVICE)
+
+
+def _has_norm_1(head: TableHead, columns: Sequence[int]) -> bool:
+    """Whether columns hold quaternions, in nearly all rows that have numbers there."""
+    if len(columns) != 4:
+        return False
+    with np.errstate(over="ignore"):
+        norms = np.sqrt(np.sum(head.rows[:, columns] ** 2, axis=1))
+    norms = norms[np.isfinite(norms) & (norms > 0.0)]
+    return len(norms) > 0 and float(np.mean(np.abs(norms - 1.0) < NORM_TOLERANCE)) > 0.95
+
+
+def _without_names(head: TableHead, before: Sequence[int], bodies: tuple[BodyColumns, ...]) -> TableColumns:
+    body = min(head.text_columns, default=None) if len(bodies) == 1 else None
+    if len(before) == 2 and body is None and len(np.unique(head.rows[:, before[1]])) <= max(len(head.rows) // 10, 1):
+        body = before[1]  # the number of a body: it has few values
+    place, turn = bodies[0].position, bodies[0].quaternion
+    parts = [
+        *([f"time {before[0] + 1}"] if before else []),
+        f"position {place[0] + 1} to {place[-1] + 1}",
+        f"quaternion {turn[0] + 1} to {turn[-1] + 1}",
+        *([f"and so on for {len(bodies)} bodies"] if len(bodies) > 1 else []),
+        *([f"body {body + 1}"] if body is not None else []),
+    ]
+    finding = FileFinding("columns", ", ".join(parts), "no header; a quaternion's columns have the norm 1")
+    return TableColumns(bodies, before[0] if before else None, None, body, findings=(finding,))

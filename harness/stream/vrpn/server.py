@@ -1,0 +1,348 @@
+"""A VRPN server of poses: any VRPN client sees its trackers.
+
+It has one thread, which takes connections and writes. A client connects by TCP, or asks by a UDP packet that the server
+connect to it, as VRPN's own programs do. Reports go by TCP alone, so that none is lost. Source: vrpn_Connection.C of
+github.com/vrpn/vrpn.
+"""
+
+import contextlib
+import errno
+import select
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from harness.core.network import LOOPBACK, check_loopback, parse_address, resolve_host
+from harness.core.number_format import count_noun
+from harness.errors import BadInput, shorten
+from harness.stream.vrpn.messages import (
+    COOKIE,
+    DEFAULT_PORT,
+    MAX_NAME_BYTES,
+    PING,
+    PONG,
+    POSE,
+    SENDER_DESCRIPTION,
+    TYPE_DESCRIPTION,
+    MalformedMessage,
+    MessageReader,
+    NameTable,
+    PoseReport,
+    VrpnMessage,
+    encode_description,
+)
+
+MAX_CLIENTS = 32
+"""Further clients are turned away."""
+MAX_UNREAD_BYTES = 8 << 20
+"""A client that leaves so much unread is disconnected: it would otherwise miss reports without noticing [bytes]."""
+DRAIN_S = 2.0
+"""Longest wait at the end for clients that still read [s]."""
+_TYPES = (POSE, PING, PONG)
+_READ_BYTES = 1 << 16
+_LONGEST_REQUEST_BYTES = 200
+_LEAST_PORT = 1024
+"""Least port that a request may name: those below belong to the system."""
+_TRIES = 16
+"""Free TCP ports that are tried until the UDP port of the same number is free too."""
+
+LogCallback = Callable[[str], None]
+
+
+def parse_served_name(text: str) -> tuple[str, str, int]:
+    """Name, host and port of `NAME[@[HOST:]PORT]`; this computer and VRPN's port by default. Raises BadInput."""
+    name, at, place = text.partition("@")
+    host, port = parse_address(place, LOOPBACK) if at else (LOOPBACK, DEFAULT_PORT)
+    if not name or not name.isprintable() or len(name.encode()) >= MAX_NAME_BYTES // 2:
+        raise BadInput(f"--vrpn {shorten(text)}: no name of a tracker.", "Write NAME[@HOST:PORT], such as Tracker0.")
+    return name, host, port
+
+
+def open_server(
+    place: str, suffixes: Sequence[str] = ("",), *, anywhere: bool = False, log: LogCallback = lambda line: None
+) -> "VrpnServer":
+    """Open the server that `--vrpn NAME[@[HOST:]PORT]` asks for, with a tracker NAME + suffix each. Raises BadInput."""
+    name, host, port = parse_served_name(place)
+    return VrpnServer([name + suffix for suffix in suffixes], host, port, anywhere=anywhere, log=log)
+
+
+class VrpnServer:
+    """Serves poses under the names of trackers until it is closed. `send` may be called from any thread."""
+
+    def __init__(
+        self,
+        trackers: Sequence[str],
+        host: str = LOOPBACK,
+        port: int = DEFAULT_PORT,
+        *,
+        anywhere: bool = False,
+        log: LogCallback = lambda line: None,
+    ) -> None:
+        """Listen; port 0 takes a free one. Raises BadInput for a port in use, or reachable without `anywhere`."""
+        check_loopback(host, anywhere, "anyone who reaches the port then sees the poses")
+        self.trackers, self._log = tuple(trackers), log
+        self._clients: list[_Client] = []
+        self._lock = threading.Lock()
+        """Held while the clients or what they have to be sent change."""
+        self._tcp, self._udp = _listen(host, port)
+        self.port = int(self._tcp.getsockname()[1])
+        self._woken, self._waker = socket.socketpair()
+        self._woken.setblocking(False)
+        self._waker.setblocking(False)
+        self._stopped = False
+        self._connected = threading.Event()
+        self.sent = 0
+        """Number of reports that were handed to all clients."""
+        self._host = host
+        self._thread = threading.Thread(target=self._run, name="vrpn server", daemon=True)
+        self._thread.start()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What clients open: `Tracker0@127.0.0.1:3883`."""
+        return tuple(f"{tracker}@{self._host}:{self.port}" for tracker in self.trackers)
+
+    @property
+    def clients(self) -> int:
+        """Number of clients that receive reports."""
+        with self._lock:
+            return sum(client.greeted for client in self._clients)
+
+    def wait_for_client(self, timeout_s: float) -> bool:
+        """Wait until the first client is there, at most `timeout_s` [s]; whether one is."""
+        return self._connected.wait(timeout_s)
+
+    def send(self, tracker: str, reports: Iterable[PoseReport]) -> None:
+        """Send reports of a tracker to all clients; never blocks."""
+        sender = self.trackers.index(tracker)
+        messages = [report.encode(_TYPES.index(POSE), sender) for report in reports]
+        with self._lock:
+            for client in self._clients:
+                if client.greeted:
+                    client.add(*messages)
+            self.sent += len(messages)
+        if messages:
+            self._wake()
+
+    def close(self) -> None:
+        """End the server, after clients have read what was sent, or `DRAIN_S`; may be called twice."""
+        self._stopped = True
+        self._wake()
+        self._thread.join()
+
+    def __enter__(self) -> "VrpnServer":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def _wake(self) -> None:
+        with contextlib.suppress(OSError):  # full, so that the thread wakes anyway; or closed
+            self._waker.send(b"x")
+
+    def _run(self) -> None:
+        until_s = None
+        try:
+            while True:
+                if self._stopped:
+                    until_s = until_s or time.monotonic() + DRAIN_S
+                    if time.monotonic() > until_s or not any(client.unsent for client in self._clients):
+                        return
+                self._serve_once()
+        finally:
+            with self._lock:
+                ends: list[Any] = [*self._clients, self._tcp, self._udp, self._woken, self._waker]
+                for end in ends:
+                    end.close()
+                self._clients = []
+
+    def _serve_once(self) -> None:
+        """Wait for bytes, clients or room, and process them."""
+        with self._lock:
+            writers = [client for client in self._clients if client.unsent]
+            ends: list[Any] = [self._tcp, self._udp, self._woken, *self._clients]
+        ready, free, _ = select.select(ends, writers, [], 0.1 if self._stopped else 1.0)
+        if self._woken in ready:
+            self._woken.recv(_READ_BYTES)
+        if self._tcp in ready:
+            self._accept()
+        if self._udp in ready:
+            self._answer_request()
+        for client in [end for end in ready if isinstance(end, _Client)]:
+            self._read(client)
+        with self._lock:
+            for client in free:
+                client.flush()
+            for client in self._clients:
+                if client.unsent_bytes > MAX_UNREAD_BYTES:
+                    client.gone = f"it left {client.unsent_bytes >> 20} MB unread"
+            gone = [client for client in self._clients if client.gone]
+            self._clients = [client for client in self._clients if not client.gone]
+        for client in gone:
+            client.close()
+            self._log(f"VRPN client {client.name} is gone: {client.gone}")
+
+    def _accept(self) -> None:
+        with contextlib.suppress(OSError):  # gone already
+            opened, place = self._tcp.accept()
+            self._add(opened, place)
+
+    def _answer_request(self) -> None:
+        """Connect to the client that asks for it, at the address from which the packet came."""
+        try:
+            packet, place = self._udp.recvfrom(_LONGEST_REQUEST_BYTES)
+        except OSError:
+            return
+        words = packet.split(b"\0")[0].split()
+        number = words[1] if len(words) == 2 else b""
+        if not number.isdigit() or len(number) > 5 or not _LEAST_PORT <= int(number) < 65536:
+            return
+        target = (place[0], int(number), *place[2:])
+        if any(client.place == target for client in self._clients):
+            return
+        opened = socket.socket(self._udp.family, socket.SOCK_STREAM)
+        opened.setblocking(False)
+        if opened.connect_ex(target) in (0, errno.EINPROGRESS, errno.EWOULDBLOCK):
+            self._add(opened, target)
+        else:
+            opened.close()
+
+    def _add(self, opened: socket.socket, place: Any) -> None:
+        if len(self._clients) >= MAX_CLIENTS:
+            opened.close()
+            self._log(f"VRPN client {place[0]} is turned away: {count_noun(MAX_CLIENTS, 'client')} are there")
+            return
+        with self._lock:
+            self._clients.append(_Client(opened, place))
+
+    def _read(self, client: "_Client") -> None:
+        """Process what a client sends: its names, and pings, which are answered."""
+        try:
+            for message in client.messages():
+                if message.type == SENDER_DESCRIPTION:
+                    client.senders.add(message)
+                elif message.type == TYPE_DESCRIPTION:
+                    client.types.add(message)
+                elif message.type >= 0 and client.types[message.type] == PING:
+                    name = client.senders[message.sender]
+                    if name in self.trackers:
+                        pong = VrpnMessage(_TYPES.index(PONG), self.trackers.index(name), _now_us())
+                        with self._lock:
+                            client.add(pong)
+        except MalformedMessage as error:
+            client.gone = f"it sent what is no message of VRPN: {error.problem}"
+        if client.has_cookie and not client.greeted and not client.gone:
+            self._greet(client)
+
+    def _greet(self, client: "_Client") -> None:
+        """Describe the trackers and types to a client; from now on it gets the reports."""
+        now_us = _now_us()
+        names = [(SENDER_DESCRIPTION, number, name) for number, name in enumerate(self.trackers)]
+        names += [(TYPE_DESCRIPTION, number, name) for number, name in enumerate(_TYPES)]
+        with self._lock:
+            client.add(*(encode_description(*name, now_us) for name in names))
+            client.greeted = True
+        self._connected.set()
+        self._log(f"VRPN client {client.name} is connected")
+
+
+class _Client:
+    """A connection to a client. It never blocks."""
+
+    def __init__(self, opened: socket.socket, place: Any) -> None:
+        opened.setblocking(False)
+        opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.place, self.name = place, f"{place[0]}:{place[1]}"
+        self.senders, self.types = NameTable(), NameTable()
+        self.greeted = False
+        """Whether names were described to it, so that it gets reports."""
+        self.gone = ""
+        """Why it is disconnected; "" while it is not."""
+        self._socket, self._reader, self._sequence = opened, MessageReader(), 0
+        self.unsent = bytearray(COOKIE)
+
+    @property
+    def has_cookie(self) -> bool:
+        """Whether its cookie has arrived."""
+        return self._reader.greeted
+
+    @property
+    def unsent_bytes(self) -> int:
+        """Number of bytes that it left no room for."""
+        return len(self.unsent)
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
+    def add(self, *messages: VrpnMessage) -> None:
+        """Send messages as soon as the client takes them."""
+        for message in messages:
+            self.unsent += message.encode(self._sequence)
+            self._sequence += 1
+
+    def flush(self) -> None:
+        """Send as many of the waiting bytes as the client takes."""
+        try:
+            while self.unsent:
+                del self.unsent[: self._socket.send(self.unsent)]
+        except BlockingIOError:
+            pass
+        except OSError as error:
+            self.gone = self.gone or str(error.strerror or error)
+
+    def messages(self) -> Iterable[VrpnMessage]:
+        """Yield what has arrived. Raises MalformedMessage."""
+        try:
+            data = self._socket.recv(_READ_BYTES)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self.gone = str(error.strerror or error)
+            return
+        if not data:
+            self.gone = "it has closed the connection"
+            return
+        yield from self._reader.feed(data)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def _now_us() -> int:
+    return time.time_ns() // 1000
+
+
+def _listen(host: str, port: int) -> tuple[socket.socket, socket.socket]:
+    """Sockets that listen for TCP and UDP at one port. Raises BadInput."""
+    for _ in range(0 if port else _TRIES):
+        with contextlib.suppress(OSError):
+            return _bind(host, 0)
+    try:
+        return _bind(host, port)
+    except (OSError, UnicodeError) as error:
+        raise _bind_error(host, port, error) from error
+
+
+def _bind(host: str, port: int) -> tuple[socket.socket, socket.socket]:
+    family, place = resolve_host(host, port, socket.SOCK_STREAM)[0]
+    with contextlib.ExitStack() as opened:
+        tcp = opened.enter_context(socket.socket(family, socket.SOCK_STREAM))
+        tcp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        tcp.bind(place)
+        udp = opened.enter_context(socket.socket(family, socket.SOCK_DGRAM))
+        udp.bind((place[0], tcp.getsockname()[1], *place[2:]))
+        tcp.listen(MAX_CLIENTS)
+        tcp.setblocking(False)
+        udp.setblocking(False)
+        opened.pop_all()
+    return tcp, udp
+
+
+def _bind_error(host: str, port: int, error: Exception) -> BadInput:
+    if getattr(error, "errno", None) == errno.EADDRINUSE:
+        advice = "Close that program, or name another port: --vrpn NAME@127.0.0.1:3884."
+        return BadInput(f"VRPN at {host}:{port}: another program listens there.", advice)
+    reason = getattr(error, "strerror", None) or error
+    return BadInput(f"VRPN at {host}:{port}: {reason}.", "Name an address of this computer, such as 127.0.0.1:3883.")
