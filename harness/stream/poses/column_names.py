@@ -9,7 +9,7 @@ from harness.core.units import LENGTH_UNITS_M, TIME_UNITS_S, find_unit
 AXES = ("x", "y", "z")
 _BRACKET = re.compile(r"[\[(]([^\])]*)[\])]")
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_a-zA-Z]+")
-_TIME = {"time", "timestamp", "timestamps", "stamp", "t", "measured", "received", "seconds", "sec", "secs"}
+_TIME = {"time", "timestamp", "timestamps", "stamp", "t", "measured", "received", "seconds", "sec", "secs", "epoch"}
 _NANOSECONDS = {"nsec", "nsecs", "nanosec", "nanoseconds"}
 _TIME_ORDER = ("measured", "stamp", "time", "timestamp", "received")
 """Words of a time's name; a device's own time comes before the time of reception."""
@@ -25,6 +25,7 @@ _OTHER = {
 _FILLERS = {"field", "pose", "poses", "transform", "msg", "message", "data", "rs", "r", "rigid", "bone", "s", "world"}
 """Words that name no body."""
 _ANGLES = {"roll", "pitch", "yaw", "azimuth", "elevation", "heading", "az", "el", "rx", "ry", "rz", "euler"}
+_IMAGINARY = {"i": "x", "j": "y", "k": "z", "r": "w", "real": "w", "s": "w"}
 _NUMBERED = {"q0": "w", "q1": "x", "q2": "y", "q3": "z"}
 _LEAVES = {
     **{f"q{axis}": ("quaternion", axis) for axis in "xyzw"},
@@ -32,6 +33,7 @@ _LEAVES = {
     **{f"rot{axis}": ("quaternion", axis) for axis in "xyzw"},
     **{f"r{axis}": ("quaternion", axis) for axis in "xyzw"},
     **{name: ("quaternion", axis) for name, axis in _NUMBERED.items()},
+    **{f"q{name}": ("quaternion", axis) for name, axis in _IMAGINARY.items()},
     **{f"{word}{axis}": ("position", axis) for word in ("p", "t", "pos") for axis in AXES},
 }
 """Last word of a name -> what the column holds. `rx`, `ry`, `rz` are angles where there is no `rw`."""
@@ -51,7 +53,7 @@ class ColumnName:
     unit: str = ""
     """The unit that the name states, such as `mm` or `ns`; "" without one."""
     family: str = ""
-    """The word before a component: `rx` and `qx` beside each other are different things."""
+    """`r` of `rx` to `rw`, which are another thing than `qx` to `qw` beside them; else empty."""
     numbered: bool = False
     """Whether `q0` to `q3` name the components, so that their order is a convention."""
 
@@ -87,14 +89,18 @@ def parse_column_name(cells: Sequence[str]) -> ColumnName:
     if every & _OTHER:
         return ColumnName("")
     kind, axis = _LEAVES.get(leaf, ("", leaf))
+    turns = bool({*context, *upper} & _ROTATION) or leaf == "w"
+    if not kind and turns and leaf in _IMAGINARY:
+        kind, axis = "quaternion", _IMAGINARY[leaf]
     if not kind and leaf in ("x", "y", "z", "w"):
-        turns = bool({*context, *upper} & _ROTATION) or leaf == "w"
         kind = "quaternion" if turns else "position"
     if kind == "position":
         length = find_unit(unit, LENGTH_UNITS_M)
         return ColumnName(kind, axis, body, length) if length or not unit else ColumnName("")
     if kind:
-        return ColumnName(kind, axis, body, family=leaf[:-1], numbered=leaf in _NUMBERED)
+        return ColumnName(
+            kind, axis, body, family="r" if leaf in ("rx", "ry", "rz", "rw") else "", numbered=leaf in _NUMBERED
+        )
     if leaf in _FRAME or words[0] in _FRAME:
         return ColumnName("frame")
     return ColumnName("body" if {*words} <= _BODY | {"frame", "rigid"} else "")

@@ -18,8 +18,8 @@ EXPECTED_COLUMNS = "columns of a time, a position and a quaternion"
 NORM_TOLERANCE = 0.01
 """Largest deviation of a quaternion's norm from 1."""
 _ADVICE = "Name the columns in their order, - for others: --columns time,x,y,z,qx,qy,qz,qw."
-_LABELS = {"id", "parent", "asset id", "type"}
-"""First words of header lines that name neither bodies nor columns; "type" is used to leave markers out."""
+_LABELS = {"id", "parent", "asset id"}
+"""First words of header lines that name neither bodies nor columns."""
 _QUATERNION = ("w", "x", "y", "z")
 _RATES = ("export frame rate", "capture frame rate", "objects", "segments")
 """Names of the rate in the headers of OptiTrack's and Vicon's programs."""
@@ -99,10 +99,9 @@ def _fit(row: Sequence[str], columns: int) -> tuple[str, ...]:
 
 
 def _is_context(row: Sequence[str]) -> bool:
-    """Whether a header line may name bodies or the kind of the columns below."""
+    """Whether a header line may name bodies or the kind of the columns below: nothing stands over the first one."""
     label = next((cell.lower() for cell in row if cell), "")
-    numbers = sum(bool(re.fullmatch(r"[\d.]+", cell)) for cell in row)
-    return bool(label) and label not in _LABELS - {"type"} and not numbers and "format version" not in label
+    return bool(label) and not row[0] and label not in _LABELS
 
 
 def _spread(row: Sequence[str]) -> list[str]:
@@ -225,7 +224,8 @@ def _from_numbers(head: TableHead) -> TableColumns:
     for before, bodies in ((lead, count), (1, 1), (0, 1), (2, 1)):  # columns before the poses, and bodies
         starts = [number[before + 7 * n : before + 7 * n + 7] for n in range(bodies)]
         for position, quaternion in ((slice(0, 3), slice(3, 7)), (slice(4, 7), slice(0, 4))):
-            if before <= 2 and starts and all(_has_norm_1(head, start[quaternion]) for start in starts):
+            whole = bool(starts) and len(starts[-1]) == 7
+            if before <= 2 and whole and all(_has_norm_1(head, start[quaternion]) for start in starts):
                 found = tuple(BodyColumns("", tuple(s[position]), tuple(s[quaternion])) for s in starts)
                 return _without_names(head, number[:before], found)
     what = f"no four columns of norm 1 where a quaternion may stand, in {head.form}"
@@ -236,8 +236,6 @@ def _from_numbers(head: TableHead) -> TableColumns:
 
 def _has_norm_1(head: TableHead, columns: Sequence[int]) -> bool:
     """Whether columns hold quaternions, in nearly all rows that have numbers there."""
-    if len(columns) != 4:
-        return False
     with np.errstate(over="ignore"):
         norms = np.sqrt(np.sum(head.rows[:, columns] ** 2, axis=1))
     norms = norms[np.isfinite(norms) & (norms > 0.0)]

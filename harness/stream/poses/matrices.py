@@ -15,8 +15,8 @@ _IN_A_LINE = {12: 0, 16: 0, 13: 1, 17: 1}
 
 
 def holds_matrices(head: TableHead) -> bool:
-    """Whether the rows of a table without header are matrices."""
-    if head.header or head.text_columns:
+    """Whether the rows of a table are matrices, whatever its header says."""
+    if head.text_columns:
         return False
     if head.columns == 4:
         return _rows_of_matrix(head.rows) > 0

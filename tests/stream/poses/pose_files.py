@@ -128,6 +128,14 @@ SAMPLES: dict[str, str | bytes] = {
         lambda n: f"1403636579,{round(1e9 * (0.25 + TIMES_S[n]))},{pose(n)}",
         ["header.stamp.secs,header.stamp.nsecs,position.x,position.y,position.z,quat.w,quat.x,quat.y,quat.z"],
     ),
+    "imaginary units and a title": rows(
+        lambda n: f"{TIMES_S[n]:.4f};{pose(n, XYZW, separator=';')};",
+        ["sep=;", "Subject;7;of;the;hall;on;a;Monday;", "elapsed time (s);x;y;z;quat_i;quat_j;quat_k;quat_real"],
+    ),
+    "matrices with names": rows(
+        lambda n: f"{TIMES_S[n]:.4f},{numbers(matrix(n)[:3].ravel())}",
+        ["time," + ",".join(f"m{row}{column}" for row in range(3) for column in range(4))],
+    ),
     "millimetres": rows(lambda n: f"{TIMES_S[n]:.4f},{pose(n, unit_m=0.001)}", ["t,x,y,z,q0,q1,q2,q3"]),
     "matrices in lines": rows(lambda n: f"{TIMES_S[n]:.4f} {numbers(matrix(n)[:3].ravel(), ' ')}"),
     "matrices column by column": rows(lambda n: f"{TIMES_S[n]:.4f},{numbers(matrix(n).T.ravel())}"),

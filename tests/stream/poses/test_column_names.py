@@ -41,9 +41,10 @@ def test_a_name_has_a_meaning(name: str, meaning: tuple[str, str, str, str]) -> 
 
 
 def test_numbers_of_components_are_a_convention() -> None:
-    assert parse_column_name(["Q0"]) == ColumnName("quaternion", "w", family="q", numbered=True)
+    assert parse_column_name(["Q0"]) == ColumnName("quaternion", "w", numbered=True)
     assert not parse_column_name(["qx"]).numbered
     assert parse_column_name(["Rx"]).family == "r"  # not of the same quaternion as qx
+    assert parse_column_name(["quat_real"]) == ColumnName("quaternion", "w")
 
 
 def test_cells_above_tell_body_and_kind() -> None:

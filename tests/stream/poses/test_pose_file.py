@@ -72,6 +72,11 @@ def test_a_file_without_times_needs_a_rate(name: str, tmp_path: Path) -> None:
     assert untimed.duration_s == COUNT - 1.0
 
 
+def test_comments_between_rows_are_counted(tmp_path: Path) -> None:
+    log = read_pose_log(write(tmp_path / "a.csv", SAMPLES["comments"]))
+    assert finding(log, "left out").value == "3 comment lines"
+
+
 def test_times_as_text_are_named(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", rows(lambda n: f"12:30:{n},{pose(n)}", [HEADER]))
     with pytest.raises(UnknownRate, match=r"a.csv has no times, but text in the column 't'"):
@@ -230,6 +235,7 @@ def test_several_files_are_bodies_of_one_log(tmp_path: Path) -> None:
     ("content", "message"),
     [
         ("1.08 0.66 1.57\n", "rows of 3 numbers, where a pose has 7"),
+        ("0.6 0.8 0 0\n" * 9, "rows of 4 numbers, where a pose has 7"),
         ("words alone\nand more of them\n", "no rows of numbers"),
         ("", "an empty file"),
         ("a,b\0c\n", "binary data"),
@@ -276,9 +282,28 @@ def test_matrices_without_translation_stay_row_by_row(tmp_path: Path) -> None:
     assert rotations.angle_between_rad(body.quaternions, QUATERNIONS).max() < 1e-6
 
 
+def test_a_name_that_is_written_in_two_ways_is_one_body(tmp_path: Path) -> None:
+    content = rows(lambda n: f"{TIMES_S[n]:.4f},{('head', ' head')[n % 2]},{pose(n)}", [f"t,name,{HEADER[2:]}"])
+    log = read_pose_log(write(tmp_path / "a.csv", content))
+    assert log.names == ("head",)
+    assert_motion(log.bodies[0])
+
+
 def test_a_column_of_ever_new_words_names_no_bodies(tmp_path: Path) -> None:
     content = rows(lambda n: f"{TIMES_S[n % COUNT]:.4f},word{n},{pose(n % COUNT)}", [f"t,name,{HEADER[2:]}"], 1001)
     with pytest.raises(BadFile, match="more than 1000 different words in the column of names"):
         read_pose_log(write(tmp_path / "a.csv", content))
     fewer = content.replace("word1000", "word1")
     assert len(read_pose_log(write(tmp_path / "b.csv", fewer)).bodies) == 1000
+
+
+def test_the_usual_order_is_that_of_euroc_for_nanoseconds(tmp_path: Path, rng: np.random.Generator) -> None:
+    """A path without a lever arm shows no order."""
+    path = np.cumsum(rng.normal(size=(COUNT, 3)), axis=0) * 0.01
+
+    def content(scale: float) -> str:
+        return rows(lambda n: f"{round(scale * TIMES_S[n])},{numbers([*path[n], *QUATERNIONS[n]])}")
+
+    for scale, usual in ((1e9, "wxyz"), (1e6, "xyzw")):
+        found = finding(read_pose_log(write(tmp_path / "a.csv", content(scale))), "quaternion order")
+        assert (found.value, found.assumed) == (usual, True)
