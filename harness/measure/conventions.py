@@ -17,8 +17,8 @@ MOST_TURN_RAD = math.radians(15.0)
 """Largest median error of orientations with which a registration is believed [choice]."""
 MOST_PLACE_M = 0.05
 """Largest median error of a station's positions with which a registration is believed [m] [choice]."""
-MOST_PLACE_SHARE = 0.15
-"""Largest such error relative to the extent of the motion: drifting odometry errs more on a longer way [choice]."""
+MOST_PLACE_SHARE = 0.3
+"""Largest such error of a source of unknown noise, relative to the extent of the motion: odometry drifts [choice]."""
 MOST_HEADING_RAD = math.radians(30.0)
 """Largest heading error that counts as one of a tracker [rad] [choice]."""
 MOST_CLOCK_ERROR = 500e-6
@@ -97,7 +97,7 @@ def require_positions(
     """Raise BadInput if positions do not follow the reference; `residual_m` holds errors (N, 3) by station.
 
     `factor` is the ratio of reported lengths to those of the reference, `heading_rad` the heading error, `extent_m` the
-    RMS distance of the reference's positions from their mean.
+    RMS distance of the reference's positions from their mean, for a source of unknown noise.
     """
     most_m = max(MOST_PLACE_M, MOST_PLACE_SHARE * extent_m) * max(1.0, abs(factor))
     size_m = {name: float(np.median(np.linalg.norm(rest, axis=1))) for name, rest in residual_m.items() if len(rest)}

@@ -220,7 +220,7 @@ def register_poses(
     extent_m = max(_extent_m(truths[body].position_m) for body in named.values())
     if extent_m > MOST_PLACE_M:
         known = np.sqrt(fit.covariance[HEADING, HEADING]) <= MOST_DEVIATION["rad"]
-        require_positions(places_m, factor, fit.state.heading_rad if known else 0.0, extent_m)
+        require_positions(places_m, factor, fit.state.heading_rad if known else 0.0, extent_m if plain else 0.0)
     if np.sqrt(fit.covariance[SCALE, SCALE]) <= MOST_DEVIATION[_OF_IT] * abs(factor):
         require_scale(factor)  # first, because the limits below are in metres
     _require_observable(fit, list(named), _PLAIN_DEVIATIONS if plain else 1.0)

@@ -19,6 +19,7 @@ READ = {
     *("inspect file", "report run", "plot run", "export run", "baseline run", "status folder", "replay file"),
     *("calibrate recording", "validate capture", "trust plan", "trust captures"),
     *("replay --calibration", "bench --baseline", "characterize --expect", "validate --expect", "record --plan"),
+    "characterize --surveyed",
 }
 """Arguments and flags with the name of a file that is read. `--mocap` is one of every verb that has it."""
 RECORDED = {"record file"}

@@ -86,6 +86,15 @@ def test_motion_about_one_axis_is_refused(rng: np.random.Generator) -> None:
         register(*foreign_pair(rng, replace(QUIET, turns=(0.8, 0.0, 0.0))))
 
 
+def test_drift_of_a_sixth_of_the_motion_is_measured_and_other_axes_are_refused(rng: np.random.Generator) -> None:
+    drifting = replace(Source().tracker, drift=(0.06, 0.02), correlation_s=20.0)
+    capture, truth = foreign_pair(rng, Source(drifting))
+    assert register(capture, truth).explained["body"][0] > 0.8
+    quarter = rotations.rotate(rotations.about_z(np.pi / 2.0), truth.position_m)
+    with pytest.raises(BadInput, match="Positions of the reference disagree with its orientations"):
+        register_poses({"body": capture}, {"body": replace(truth, position_m=quarter)}, plain=True, least_matched=0.6)
+
+
 def test_another_motion_is_refused_with_its_correlation(rng: np.random.Generator) -> None:
     capture, (_, truth) = foreign_pair(rng, QUIET)[0], foreign_pair(rng, QUIET)
     with pytest.raises(BadInput, match=r"correlate by 0\.\d\d at best"):

@@ -224,7 +224,8 @@ def _from_numbers(head: TableHead) -> TableColumns:
     for before, bodies in ((lead, count), (1, 1), (0, 1), (2, 1)):  # columns before the poses, and bodies
         starts = [number[before + 7 * n : before + 7 * n + 7] for n in range(bodies)]
         for position, quaternion in ((slice(0, 3), slice(3, 7)), (slice(4, 7), slice(0, 4))):
-            if before <= 2 and starts and all(_has_norm_1(head, start[quaternion]) for start in starts):
+            whole = bool(starts) and len(starts[-1]) == 7
+            if before <= 2 and whole and all(_has_norm_1(head, start[quaternion]) for start in starts):
                 found = tuple(BodyColumns("", tuple(s[position]), tuple(s[quaternion])) for s in starts)
                 return _without_names(head, number[:before], found)
     what = f"no four columns of norm 1 where a quaternion may stand, in {head.form}"
@@ -235,8 +236,6 @@ def _from_numbers(head: TableHead) -> TableColumns:
 
 def _has_norm_1(head: TableHead, columns: Sequence[int]) -> bool:
     """Whether columns hold quaternions, in nearly all rows that have numbers there."""
-    if len(columns) != 4:
-        return False
     with np.errstate(over="ignore"):
         norms = np.sqrt(np.sum(head.rows[:, columns] ** 2, axis=1))
     norms = norms[np.isfinite(norms) & (norms > 0.0)]

@@ -156,7 +156,7 @@ def validate_capture(
             *unseen,
             *directions,
             *_describe_clocks(capture, truth, registration),
-            *describe_explained(registration),
+            *(describe_explained(registration) if wire is None else ()),
             *describe_left_out(registration.errors),
             *truth.notes,
             "Errors are those after the registration: constant errors of room and mounts are in its numbers.",

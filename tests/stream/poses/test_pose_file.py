@@ -72,6 +72,11 @@ def test_a_file_without_times_needs_a_rate(name: str, tmp_path: Path) -> None:
     assert untimed.duration_s == COUNT - 1.0
 
 
+def test_comments_between_rows_are_counted(tmp_path: Path) -> None:
+    log = read_pose_log(write(tmp_path / "a.csv", SAMPLES["comments"]))
+    assert finding(log, "left out").value == "3 comment lines"
+
+
 def test_times_as_text_are_named(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", rows(lambda n: f"12:30:{n},{pose(n)}", [HEADER]))
     with pytest.raises(UnknownRate, match=r"a.csv has no times, but text in the column 't'"):
@@ -230,6 +235,7 @@ def test_several_files_are_bodies_of_one_log(tmp_path: Path) -> None:
     ("content", "message"),
     [
         ("1.08 0.66 1.57\n", "rows of 3 numbers, where a pose has 7"),
+        ("0.6 0.8 0 0\n" * 9, "rows of 4 numbers, where a pose has 7"),
         ("words alone\nand more of them\n", "no rows of numbers"),
         ("", "an empty file"),
         ("a,b\0c\n", "binary data"),
