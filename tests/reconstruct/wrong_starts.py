@@ -1,4 +1,6 @@
-"""How often `expert_map` that starts anywhere in a clip errs for good: `python -m tests.wrong_starts [--seed N]`.
+"""How often `expert_map` that starts anywhere in a clip errs for good.
+
+    python -m tests.reconstruct.wrong_starts [--seed N]
 
 Each clip of the accuracy benchmark's set-up with positions alone gets four random starts. Each start is followed twice:
 cold, and with the true poses in its history after the first frames. The start is *wrong* when most of the cold one's
@@ -16,8 +18,7 @@ from harness.bench.accuracy.setups import plan_setups, setup_of
 from harness.core.arrays import Bools, Floats
 from harness.core.seeds import generator
 from harness.core.split import ClipPart
-from harness.experiment import ObservedTake, simulated_take
-from harness.experiment.clip_evaluation import ClipEvaluation
+from harness.experiment import ClipEvaluation, ObservedTake, simulated_take
 from harness.experiment.scenarios import open_scenario_motion
 from harness.reconstruct import Reconstructor, make_method
 from harness.reconstruct.solver.history_session import HistorySession
