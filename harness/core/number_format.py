@@ -185,7 +185,7 @@ class Interval:
         low, high = self._write(self.low), self._write(self.high)
         if low == high and not self._is_exact:  # it has no visible width
             half = 0.5 * (self.high - self.low)
-            return f"± {format_fixed(half, decimals_for(half, most=12))}"
+            return f"± {format_fixed(half, decimals_for(half, most=12)) if half >= 1e-12 else f'{half:.0e}'}"
         return f"{low} to {high}"
 
     def __str__(self) -> str:

@@ -81,6 +81,7 @@ def test_decimals_show_the_smallest_value(values: tuple[float | None, ...], digi
         (Interval(0.3, -0.0001, 0.6, signed=True, unit="deg"), "+0.3 deg (0.0 to +0.6)"),
         (Interval(0.0, 0.0, 5e-3, unit="%"), "0 % (0.000 to 0.005)"),
         (Interval(39.9992, 39.999199, 39.999201), "39.9992 (± 0.000001)"),
+        (Interval(0.0, -3e-14, 3e-14, unit="ms"), "0 ms (± 3e-14)"),
         (Interval(-12345.0, -12345.0003, -12344.9997, unit="ms"), "−12,345 ms (± 0.0003)"),
         (Interval(-0.1, -0.1, -0.1 + 1e-16, signed=True), "−0.1"),  # a width of rounding alone
         (Interval(-12345.0, -12345.0 - 1e-9, -12345.0 + 1e-9, unit="ms"), "−12,345 ms"),

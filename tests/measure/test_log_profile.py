@@ -1,6 +1,7 @@
 """Sources of poses at uneven times: even series, noise at rest and in motion, repeats, and surveyed points."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -206,3 +207,26 @@ def test_a_log_of_few_poses_is_refused() -> None:
     body = BodyPoses("a", np.arange(5.0), np.zeros((5, 3)), np.tile(rotations.IDENTITY, (5, 1)))
     with pytest.raises(BadInput, match="no body with 20 poses"):
         measure_log_profile(log_of(body))
+
+
+def test_steps_that_are_equal_show_no_resolution_and_no_jitter(rng: np.random.Generator) -> None:
+    body = resting(rng, 30.0)
+    even = BodyPoses("tracker", 0.02 * np.arange(len(body.times_s)), body.positions_m, body.quaternions)
+    timing = measure_log_profile(log_of(even)).timing.all_stations
+    assert timing["timing.jitter_s"].value == 0.0
+    assert "equal" in timing["timing.stamp_resolution_s"].reason
+    rounded = BodyPoses("tracker", np.round(even.times_s * 0.75, 2), even.positions_m, even.quaternions)
+    timing = measure_log_profile(log_of(rounded)).timing.all_stations
+    assert timing["timing.stamp_resolution_s"].value == 0.01
+    assert timing["timing.jitter_s"].value == pytest.approx(0.005, rel=0.05)
+
+
+def test_times_that_were_counted_measure_no_clock(rng: np.random.Generator) -> None:
+    log = replace(log_of(resting(rng, 30.0)), clock="samples counted at 60 Hz")
+    found = measure_log_profile(log)
+    for timing in (found.timing.all_stations, found.timing.by_station["tracker"]):
+        for key in ("timing.rate_hz", "timing.jitter_s", "timing.lost_share"):
+            assert timing[key].reason == "The source has no times: samples counted at 60 Hz."
+        assert timing["timing.duplicate_share"].is_measured
+    assert "no times" in found.timing.all_stations["timing.stamp_resolution_s"].reason
+    assert found.limits[0].endswith("poses without times, samples counted at 60 Hz.")
