@@ -114,7 +114,7 @@ def _raw(body: BodyPoses, kept: Bools) -> StationReadings:
 
 
 def _describe(body: BodyPoses, kept: Bools, series: EvenSeries, counted: str) -> list[str]:
-    """How the poses of a body come, what was left out for an even rate, and the bound of its noise."""
+    """How the poses of a body come, what was left out for an even rate, and the scatter of neighbours."""
     out = [describe_sampling(body.name, body.times_s, counted)]
     if not kept.all():
         out.append(
@@ -128,8 +128,8 @@ def _describe(body: BodyPoses, kept: Bools, series: EvenSeries, counted: str) ->
     place_m, turn_rad = neighbour_noise(body, kept)
     if math.isfinite(place_m):
         out.append(
-            f"{body.name}: from one pose to the next noise is at most {1e3 * place_m:.3g} mm and "
-            f"{math.degrees(turn_rad):.3g} deg on each axis."
+            f"{body.name}: from one pose to the next scatter is {1e3 * place_m:.3g} mm and "
+            f"{math.degrees(turn_rad):.3g} deg on each axis, fast motion included."
         )
     return out
 

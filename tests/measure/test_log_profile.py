@@ -104,6 +104,8 @@ def test_noise_in_motion_is_bounded_at_uneven_times(rng: np.random.Generator) ->
     place_m, turn_rad = neighbour_noise(BodyPoses("hand", time_s, place, turn), np.ones(len(time_s), bool))
     assert place_m == pytest.approx(0.001, rel=0.1)
     assert turn_rad == pytest.approx(0.002, rel=0.1)
+    notes = measure_log_profile(log_of(BodyPoses("hand", time_s, place, turn))).limits
+    assert any(f"scatter is {1e3 * place_m:.3g} mm" in note and "fast motion included" in note for note in notes)
 
 
 def test_a_moving_bar_shows_bias_and_budget_of_its_length(rng: np.random.Generator) -> None:
