@@ -75,7 +75,7 @@ def measure_log_profile(
         (StretchLength("", log.duration_s, sum(len(body.times_s) for body in bodies)),),
         (),
         0,
-        _timing(bodies, repeats, f"The source has no times: {counted}." if counted else ""),
+        _timing(bodies, repeats, log.start_unix_s or 0.0, f"The source has no times: {counted}." if counted else ""),
         noise,
         episodes,
         (),
@@ -134,11 +134,15 @@ def _describe(body: BodyPoses, kept: Bools, series: EvenSeries, counted: str) ->
     return out
 
 
-def _timing(bodies: list[BodyPoses], repeats: Mapping[str, Bools], untimed: str) -> TimingMeasurement:
-    """The timing of the bodies, of each and together; `untimed` is the reason why times show nothing, or ""."""
-    by_station = {body.name: _numbers([body], repeats, untimed) for body in bodies}
+def _timing(bodies: list[BodyPoses], repeats: Mapping[str, Bools], start_s: float, untimed: str) -> TimingMeasurement:
+    """The timing of the bodies, of each and together; `untimed` is the reason why times show nothing, or "".
+
+    `start_s` is the file's time at time 0: near Unix times, 64-bit numbers are 0.2 us apart.
+    """
+    rounding_s = float(np.spacing(start_s + max(body.times_s[-1] for body in bodies)))
+    by_station = {body.name: _numbers([body], repeats, rounding_s, untimed) for body in bodies}
     resolution_s = min(_resolution_s(body.times_s) for body in bodies)
-    together = _numbers(bodies, repeats, untimed)
+    together = _numbers(bodies, repeats, rounding_s, untimed)
     even = together["timing.jitter_s"].value == 0.0
     together["timing.stamp_resolution_s"] = (
         Interval.missing(untimed or _EVEN)
@@ -149,7 +153,9 @@ def _timing(bodies: list[BodyPoses], repeats: Mapping[str, Bools], untimed: str)
     return TimingMeasurement({key: together.get(key, missing) for key in TIMING_KEYS}, by_station, resolution_s)
 
 
-def _numbers(bodies: list[BodyPoses], repeats: Mapping[str, Bools], untimed: str) -> dict[str, Interval]:
+def _numbers(
+    bodies: list[BodyPoses], repeats: Mapping[str, Bools], rounding_s: float, untimed: str
+) -> dict[str, Interval]:
     """Rate of a body, standard deviation of its steps, lost and repeated poses, over bodies of one source."""
     steps = [step_s[step_s < PAUSE_S] for body in bodies for step_s in [np.diff(body.times_s)]]
     singles = [step_s[step_s < LOST_STEP * np.median(step_s)] for step_s in steps]
@@ -163,8 +169,8 @@ def _numbers(bodies: list[BodyPoses], repeats: Mapping[str, Bools], untimed: str
         timed = ("timing.rate_hz", "timing.jitter_s", "timing.lost_share")
         return {**dict.fromkeys(timed, Interval.missing(untimed)), "timing.duplicate_share": duplicates}
     jitter_s = float(np.sqrt(np.mean(np.concatenate([one - one.mean() for one in singles]) ** 2)))
-    if jitter_s <= max(float(np.spacing(body.times_s[-1])) for body in bodies):
-        jitter_s = 0.0  # it is the rounding of the machine's numbers
+    if jitter_s <= rounding_s:
+        jitter_s = 0.0
     doubt = jitter_s / math.sqrt(count) / period_s
     return {
         "timing.rate_hz": Interval.normal(1.0 / period_s, doubt / period_s, count),

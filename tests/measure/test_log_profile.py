@@ -217,6 +217,10 @@ def test_steps_that_are_equal_show_no_resolution_and_no_jitter(rng: np.random.Ge
     timing = measure_log_profile(log_of(even)).timing.all_stations
     assert timing["timing.jitter_s"].value == 0.0
     assert "equal" in timing["timing.stamp_resolution_s"].reason
+    unix_s = 1.68e9 + even.times_s
+    stored = BodyPoses("tracker", unix_s - unix_s[0], even.positions_m, even.quaternions)
+    timing = measure_log_profile(replace(log_of(stored), start_unix_s=1.68e9)).timing.all_stations
+    assert (timing["timing.jitter_s"].value, timing["timing.stamp_resolution_s"].is_measured) == (0.0, False)
     rounded = BodyPoses("tracker", np.round(even.times_s * 0.75, 2), even.positions_m, even.quaternions)
     timing = measure_log_profile(log_of(rounded)).timing.all_stations
     assert timing["timing.stamp_resolution_s"].value == 0.01
