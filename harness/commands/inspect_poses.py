@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from harness.commands.flags import repeat_flags
 from harness.commands.output import print_result
 from harness.commands.pose_flags import POSE_FLAGS, pose_options, read_poses
-from harness.core.number_format import format_fixed, format_share
+from harness.core.number_format import count_noun, format_fixed, format_share
 from harness.core.text_table import Table
 from harness.errors import Outcome
 
@@ -72,7 +72,7 @@ def _title(log: "PoseLog", *, timed: bool) -> str:
     clock = f", {log.clock}"
     if log.start_unix_s is not None:
         clock += f" from {datetime.fromtimestamp(log.start_unix_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
-    return f"{log.source}: {poses:,} poses of {bodies}{duration}{clock}"
+    return f"{log.source}: {count_noun(poses, 'pose')} of {bodies}{duration}{clock}"
 
 
 def _recording_lines(found: "PoseRecording") -> list[str]:

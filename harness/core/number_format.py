@@ -76,6 +76,8 @@ NORMAL_QUANTILE = 1.959963984540054
 CHI_QUANTILE = 2.795483482915108
 """95 % quantile of the length of a vector of three standard normal numbers."""
 _MOST_DECIMALS, _MOST_DIGITS = 6, 7
+_ROUNDING = 1e-12
+"""Numbers and widths up to it are rounding of the machine, in all units that are shown."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +145,7 @@ class Interval:
 
     @property
     def _is_exact(self) -> bool:
-        return math.isclose(self.low, self.high, rel_tol=1e-12)
+        return math.isclose(self.low, self.high, rel_tol=1e-12, abs_tol=_ROUNDING)
 
     def contains(self, value: float) -> bool:
         """Whether the interval contains a value."""
@@ -170,7 +172,8 @@ class Interval:
         """The estimate with its unit, "1.20 mm"; "not measured" without one."""
         if not self.is_measured:
             return NOT_MEASURED
-        return f"{self._write(self.value) if self.value else '0'} {self.unit}".rstrip()
+        nothing = not self.value or (self._is_exact and abs(self.value) <= _ROUNDING)
+        return f"{'0' if nothing else self._write(self.value)} {self.unit}".rstrip()
 
     @property
     def ends(self) -> str:

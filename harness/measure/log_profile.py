@@ -33,6 +33,7 @@ _MOST_REPEATS = 0.5
 """Share of repeats from which on they show the resolution of a body at rest, and are kept [choice]."""
 _NO_REST = "No body rests for 5 s."
 _NO_HOST = "A file of poses has no clock of a host."
+_EVEN = "All steps are equal, and do not show it."
 
 
 def measure_log_profile(
@@ -53,6 +54,7 @@ def measure_log_profile(
     repeats = {body.name: find_repeats(body) for body in bodies}
     kept = {name: ~same if same.mean() < _MOST_REPEATS else np.ones(len(same), bool) for name, same in repeats.items()}
     series = {body.name: even_series(body, kept[body.name]) for body in bodies}
+    counted = log.clock if log.is_counted else ""
     rate_hz = round(1.0 / mean_period_s([body.times_s for body in bodies]), 3)
     collected = CollectedReadings(rate_hz, bar)
     for name, even in series.items():
@@ -63,7 +65,7 @@ def measure_log_profile(
     unseen = [body.name for body in log.bodies if body not in bodies]
     notes = [f"{name}: fewer than {_FEWEST} poses, not measured." for name in unseen]
     for body in bodies:
-        notes += _describe(body, kept[body.name], series[body.name])
+        notes += _describe(body, kept[body.name], series[body.name], counted)
     noise, episodes = _fit(collected, notes, progress)
     return UnitProfile(
         tuple(body.name for body in bodies),
@@ -73,7 +75,7 @@ def measure_log_profile(
         (StretchLength("", log.duration_s, sum(len(body.times_s) for body in bodies)),),
         (),
         0,
-        _timing(bodies, repeats),
+        _timing(bodies, repeats, log.start_unix_s or 0.0, f"The source has no times: {counted}." if counted else ""),
         noise,
         episodes,
         (),
@@ -111,9 +113,9 @@ def _raw(body: BodyPoses, kept: Bools) -> StationReadings:
     )
 
 
-def _describe(body: BodyPoses, kept: Bools, series: EvenSeries) -> list[str]:
-    """How the poses of a body come, what was left out for an even rate, and the bound of its noise."""
-    out = [describe_sampling(body.name, body.times_s)]
+def _describe(body: BodyPoses, kept: Bools, series: EvenSeries, counted: str) -> list[str]:
+    """How the poses of a body come, what was left out for an even rate, and the scatter of neighbours."""
+    out = [describe_sampling(body.name, body.times_s, counted)]
     if not kept.all():
         out.append(
             f"{body.name}: {100.0 * np.mean(~kept):.1f} % of the poses repeat the one before, and were left out."
@@ -126,22 +128,34 @@ def _describe(body: BodyPoses, kept: Bools, series: EvenSeries) -> list[str]:
     place_m, turn_rad = neighbour_noise(body, kept)
     if math.isfinite(place_m):
         out.append(
-            f"{body.name}: from one pose to the next noise is at most {1e3 * place_m:.3g} mm and "
-            f"{math.degrees(turn_rad):.3g} deg on each axis."
+            f"{body.name}: from one pose to the next scatter is {1e3 * place_m:.3g} mm and "
+            f"{math.degrees(turn_rad):.3g} deg on each axis, fast motion included."
         )
     return out
 
 
-def _timing(bodies: list[BodyPoses], repeats: Mapping[str, Bools]) -> TimingMeasurement:
-    by_station = {body.name: _numbers([body], repeats) for body in bodies}
+def _timing(bodies: list[BodyPoses], repeats: Mapping[str, Bools], start_s: float, untimed: str) -> TimingMeasurement:
+    """The timing of the bodies, of each and together; `untimed` is the reason why times show nothing, or "".
+
+    `start_s` is the file's time at time 0: near Unix times, 64-bit numbers are 0.2 us apart.
+    """
+    rounding_s = float(np.spacing(start_s + max(body.times_s[-1] for body in bodies)))
+    by_station = {body.name: _numbers([body], repeats, rounding_s, untimed) for body in bodies}
     resolution_s = min(_resolution_s(body.times_s) for body in bodies)
-    together = _numbers(bodies, repeats)
-    together["timing.stamp_resolution_s"] = Interval(resolution_s, resolution_s, resolution_s, len(bodies))
+    together = _numbers(bodies, repeats, rounding_s, untimed)
+    even = together["timing.jitter_s"].value == 0.0
+    together["timing.stamp_resolution_s"] = (
+        Interval.missing(untimed or _EVEN)
+        if untimed or even
+        else Interval(resolution_s, resolution_s, resolution_s, len(bodies))
+    )
     missing = Interval.missing(_NO_HOST)
     return TimingMeasurement({key: together.get(key, missing) for key in TIMING_KEYS}, by_station, resolution_s)
 
 
-def _numbers(bodies: list[BodyPoses], repeats: Mapping[str, Bools]) -> dict[str, Interval]:
+def _numbers(
+    bodies: list[BodyPoses], repeats: Mapping[str, Bools], rounding_s: float, untimed: str
+) -> dict[str, Interval]:
     """Rate of a body, standard deviation of its steps, lost and repeated poses, over bodies of one source."""
     steps = [step_s[step_s < PAUSE_S] for body in bodies for step_s in [np.diff(body.times_s)]]
     singles = [step_s[step_s < LOST_STEP * np.median(step_s)] for step_s in steps]
@@ -149,14 +163,20 @@ def _numbers(bodies: list[BodyPoses], repeats: Mapping[str, Bools]) -> dict[str,
     lost = sum(max(round(one) - len(step_s), 0) for one, step_s in zip(due, steps, strict=True))
     count = sum(map(len, singles))
     period_s = mean_period_s([body.times_s for body in bodies])
-    jitter_s = float(np.sqrt(np.mean(np.concatenate([one - one.mean() for one in singles]) ** 2)))
-    doubt = jitter_s / math.sqrt(count) / period_s
     twice = sum(int(repeats[body.name].sum()) for body in bodies)
+    duplicates = count_share(twice, sum(len(body.times_s) for body in bodies))
+    if untimed:
+        timed = ("timing.rate_hz", "timing.jitter_s", "timing.lost_share")
+        return {**dict.fromkeys(timed, Interval.missing(untimed)), "timing.duplicate_share": duplicates}
+    jitter_s = float(np.sqrt(np.mean(np.concatenate([one - one.mean() for one in singles]) ** 2)))
+    if jitter_s <= rounding_s:
+        jitter_s = 0.0
+    doubt = jitter_s / math.sqrt(count) / period_s
     return {
         "timing.rate_hz": Interval.normal(1.0 / period_s, doubt / period_s, count),
         "timing.jitter_s": Interval.normal(jitter_s, jitter_s / math.sqrt(2.0 * count), count, least=0.0),
         "timing.lost_share": count_share(lost, lost + sum(map(len, steps))),
-        "timing.duplicate_share": count_share(twice, sum(len(body.times_s) for body in bodies)),
+        "timing.duplicate_share": duplicates,
     }
 
 

@@ -235,8 +235,10 @@ def _extent_m(position_m: Floats) -> float:
 
 
 def require_stamps(stations: Mapping[str, MeasuredPoses]) -> None:
-    """Raise BadInput unless the records of each station have times."""
+    """Raise BadInput unless the records of each station have times, two or more."""
     for name, station in stations.items():
+        if len(station.measured_s) == 1:
+            raise BadInput(f"Station {name!r} has one pose.", "Record for longer.")
         if np.isfinite(station.measured_s).sum() < 2:
             raise BadInput(
                 f"Records of station {name!r} have no time stamps.",

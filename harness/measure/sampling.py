@@ -41,10 +41,15 @@ def _own_share(times_s: Sequence[Floats], step_s: float) -> float:
     return own / max(total, 1)
 
 
-def describe_sampling(name: str, time_s: Floats) -> str:
-    """A sentence on the rising times (N,) of a source [s]: period, range of its steps, and time without samples."""
+def describe_sampling(name: str, time_s: Floats, counted: str = "") -> str:
+    """A sentence on the rising times (N,) of a source [s]: period, range of its steps, and time without samples.
+
+    `counted` says how samples were counted where the source has no times, which then show nothing.
+    """
     if len(time_s) < 2:
         return f"{name}: {len(time_s)} pose."
+    if counted:
+        return f"{name}: {len(time_s):,} poses without times, {counted}."
     step_s, period_s = np.diff(time_s), mean_period_s([time_s])
     low, high = np.quantile(step_s, [0.05, 0.95]).tolist()
     evenness = "evenly" if own_places_s([time_s], period_s) == period_s else "unevenly"

@@ -13,7 +13,7 @@ from harness.study.trust.plan import plan_digest
 from tests.command import Command
 from tests.mocap.c3d_bytes import c3d_bytes
 from tests.report.reading import text_of
-from tests.stream.poses.pose_files import COUNT, SAMPLES, TIMES_S, UNTIMED, motive, tum, write
+from tests.stream.poses.pose_files import COUNT, SAMPLES, TIMES_S, UNTIMED, motive, pose, tum, write
 from tests.verb_examples import unpack_files
 
 
@@ -62,6 +62,14 @@ def test_inspect_of_a_file_without_times_asks_for_its_rate(folder: Path, command
     content = command("inspect", "jug.traj", "--json").content
     assert (content["duration_s"], content["bodies"][0].keys()) == (None, {"name", "poses", "repeated_share"})
     assert "rate_hz" in command("inspect", "jug.traj", "--rate", "50", "--json").content["bodies"][0]
+
+
+def test_a_single_pose_and_a_header_alone(folder: Path, command: Command) -> None:
+    write(folder / "one.csv", f"t,x,y,z,qw,qx,qy,qz\n0.5,{pose(0)}\n")
+    assert command("inspect", "one.csv").lines[0].startswith("one.csv: 1 pose of 1 body, ")
+    write(folder / "header.csv", "t,x,y,z,qw,qx,qy,qz\n")
+    assert "What other poses lack, `harness inspect` says" in command("view", "header.csv", code=2).err
+    assert "no rows of numbers" in command("inspect", "header.csv", code=2).err
 
 
 def test_inspect_reads_several_files_on_one_clock(folder: Path, command: Command) -> None:

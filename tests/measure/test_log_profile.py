@@ -1,6 +1,7 @@
 """Sources of poses at uneven times: even series, noise at rest and in motion, repeats, and surveyed points."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -103,6 +104,8 @@ def test_noise_in_motion_is_bounded_at_uneven_times(rng: np.random.Generator) ->
     place_m, turn_rad = neighbour_noise(BodyPoses("hand", time_s, place, turn), np.ones(len(time_s), bool))
     assert place_m == pytest.approx(0.001, rel=0.1)
     assert turn_rad == pytest.approx(0.002, rel=0.1)
+    notes = measure_log_profile(log_of(BodyPoses("hand", time_s, place, turn))).limits
+    assert any(f"scatter is {1e3 * place_m:.3g} mm" in note and "fast motion included" in note for note in notes)
 
 
 def test_a_moving_bar_shows_bias_and_budget_of_its_length(rng: np.random.Generator) -> None:
@@ -206,3 +209,30 @@ def test_a_log_of_few_poses_is_refused() -> None:
     body = BodyPoses("a", np.arange(5.0), np.zeros((5, 3)), np.tile(rotations.IDENTITY, (5, 1)))
     with pytest.raises(BadInput, match="no body with 20 poses"):
         measure_log_profile(log_of(body))
+
+
+def test_steps_that_are_equal_show_no_resolution_and_no_jitter(rng: np.random.Generator) -> None:
+    body = resting(rng, 30.0)
+    even = BodyPoses("tracker", 0.02 * np.arange(len(body.times_s)), body.positions_m, body.quaternions)
+    timing = measure_log_profile(log_of(even)).timing.all_stations
+    assert timing["timing.jitter_s"].value == 0.0
+    assert "equal" in timing["timing.stamp_resolution_s"].reason
+    unix_s = 1.68e9 + even.times_s
+    stored = BodyPoses("tracker", unix_s - unix_s[0], even.positions_m, even.quaternions)
+    timing = measure_log_profile(replace(log_of(stored), start_unix_s=1.68e9)).timing.all_stations
+    assert (timing["timing.jitter_s"].value, timing["timing.stamp_resolution_s"].is_measured) == (0.0, False)
+    rounded = BodyPoses("tracker", np.round(even.times_s * 0.75, 2), even.positions_m, even.quaternions)
+    timing = measure_log_profile(log_of(rounded)).timing.all_stations
+    assert timing["timing.stamp_resolution_s"].value == 0.01
+    assert timing["timing.jitter_s"].value == pytest.approx(0.005, rel=0.05)
+
+
+def test_times_that_were_counted_measure_no_clock(rng: np.random.Generator) -> None:
+    log = replace(log_of(resting(rng, 30.0)), clock="samples counted at 60 Hz")
+    found = measure_log_profile(log)
+    for timing in (found.timing.all_stations, found.timing.by_station["tracker"]):
+        for key in ("timing.rate_hz", "timing.jitter_s", "timing.lost_share"):
+            assert timing[key].reason == "The source has no times: samples counted at 60 Hz."
+        assert timing["timing.duplicate_share"].is_measured
+    assert "no times" in found.timing.all_stations["timing.stamp_resolution_s"].reason
+    assert found.limits[0].endswith("poses without times, samples counted at 60 Hz.")

@@ -173,6 +173,8 @@ def test_inputs_that_do_not_show_the_values_are_refused(rng: np.random.Generator
 
     unstamped = MeasuredPoses(np.full(len(hand.valid), np.nan), hand.position_m, hand.tracker_from_station, hand.valid)
     refuses(unstamped, truth, "'hand' have no time stamps")
+    alone = MeasuredPoses(hand.measured_s[:1], hand.position_m[:1], hand.tracker_from_station[:1], hand.valid[:1])
+    refuses(alone, truth, "'hand' has one pose")
     sparse = MeasuredPoses(
         hand.measured_s, hand.position_m, hand.tracker_from_station, np.arange(len(hand.valid)) % 12 != 0
     )

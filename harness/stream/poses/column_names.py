@@ -14,7 +14,10 @@ _NANOSECONDS = {"nsec", "nsecs", "nanosec", "nanoseconds"}
 _TIME_ORDER = ("measured", "stamp", "time", "timestamp", "received")
 """Words of a time's name; a device's own time comes before the time of reception."""
 _FRAME = {"frame", "framenumber", "index", "idx", "seq", "sample", "framenum", "number"}
-_BODY = {"station", "body", "name", "object", "tracker", "sensor", "device", "id", "target", "tool", "child", "segment"}
+_BODY = {
+    *("station", "body", "name", "object", "tracker", "sensor", "device", "id", "target", "tool", "child", "segment"),
+    "serial",
+}
 _POSITION = {"p", "pos", "position", "trans", "translation", "location", "loc", "xyz", "origin"}
 _ROTATION = {"q", "quat", "quaternion", "orientation", "orient", "rotation", "rot", "attitude", "ori", "qua"}
 _OTHER = {

@@ -20,6 +20,8 @@ NORM_TOLERANCE = 0.01
 _ADVICE = "Name the columns in their order, - for others: --columns time,x,y,z,qx,qy,qz,qw."
 _LABELS = {"id", "parent", "asset id"}
 """First words of header lines that name neither bodies nor columns."""
+_IDENTIFIER = re.compile(r"[0-9a-f]{8,32}")
+"""An identifier of OptiTrack's program, in lower case."""
 _QUATERNION = ("w", "x", "y", "z")
 _RATES = ("export frame rate", "capture frame rate", "objects", "segments")
 """Names of the rate in the headers of OptiTrack's and Vicon's programs."""
@@ -77,9 +79,11 @@ def find_columns(head: TableHead, names: Sequence[str] | None = None) -> TableCo
         found = f"rotations of the type {facts['rotation type']}"
         raise BadFile(head.path, found, "quaternions", "Export with the rotation type Quaternion.")
     rows = [row for row in (_fit(row, head.columns) for row in head.header) if row]
-    scores = [sum(parse_column_name([cell]).kind != "" for cell in row) for row in rows]
+    scores = [sum(parse_column_name([cell]).kind not in ("", "body") for cell in row) for row in rows]
     best = max(range(len(rows)), key=lambda n: (scores[n], n), default=None)
-    if best is None or scores[best] < min(6, head.columns):
+    own = [] if best is None else [parse_column_name([cell]) for cell in rows[best]]
+    turn = {name.axis for name in own if name.kind == "quaternion"} == set(_QUATERNION)
+    if best is None or (scores[best] < min(6, head.columns) and not turn):
         return _from_numbers(head)
     above = [_spread(row) for row in rows[:best] if _is_context(row)]
     cells = [(*(row[c] for row in above), rows[best][c]) for c in range(head.columns)]
@@ -101,7 +105,7 @@ def _fit(row: Sequence[str], columns: int) -> tuple[str, ...]:
 def _is_context(row: Sequence[str]) -> bool:
     """Whether a header line may name bodies or the kind of the columns below: nothing stands over the first one."""
     label = next((cell.lower() for cell in row if cell), "")
-    return bool(label) and not row[0] and label not in _LABELS
+    return bool(label) and not row[0] and label not in _LABELS and not _IDENTIFIER.fullmatch(label)
 
 
 def _spread(row: Sequence[str]) -> list[str]:

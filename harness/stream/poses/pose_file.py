@@ -27,7 +27,7 @@ from harness.stream.poses.evidence import (
 from harness.stream.poses.matrices import holds_matrices, split_matrices
 from harness.stream.poses.number_table import EXPECTED_FILE, TableHead, read_head, read_rows
 from harness.stream.poses.options import PoseFileOptions
-from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
+from harness.stream.poses.pose_log import COUNTED, BodyPoses, FileFinding, PoseLog
 
 _UP_TO_Z = {
     "z": (1.0, 0.0, 0.0, 0.0),
@@ -228,8 +228,8 @@ def _conclude_clock(
             rows = sum(len(one.times_s) for one in raw)
             raise UnknownRate(f"{path.name} has {what} ({count_noun(rows, 'sample')}).")
         reason = "given by --rate" if options.rate_hz else "the file's header"
-        findings.append(FileFinding("time", f"counted at {rate_hz:g} Hz", f"{reason}; the file has {what}"))
-        return 1.0 / rate_hz, f"samples counted at {rate_hz:g} Hz"
+        findings.append(FileFinding("time", f"{COUNTED} {rate_hz:g} Hz", f"{reason}; the file has {what}"))
+        return 1.0 / rate_hz, f"samples {COUNTED} {rate_hz:g} Hz"
     if options.rate_hz is not None:
         raise BadInput(f"{path.name} has times of its own.", "Leave out --rate.")
     unit = conclude_time_unit(times, columns.time_unit, options.time_unit)

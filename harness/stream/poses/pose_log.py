@@ -12,6 +12,8 @@ from harness.core.arrays import Floats, freeze
 from harness.errors import BadInput, UnknownName
 
 _NORM_TOLERANCE = 1e-6
+COUNTED = "counted at"
+"""Words in the clock of a log whose source has no times, before the rate that somebody stated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +80,11 @@ class PoseLog:
     def names(self) -> tuple[str, ...]:
         """Names of the bodies."""
         return tuple(body.name for body in self.bodies)
+
+    @property
+    def is_counted(self) -> bool:
+        """Whether the source has no times: the samples were counted at a stated rate, which nothing measures."""
+        return COUNTED in self.clock
 
     @property
     def duration_s(self) -> float:

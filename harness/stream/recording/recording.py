@@ -249,7 +249,8 @@ def _check_kind(path: Path, data: bytes) -> None:
         and not FILE_HEADER.startswith(data)
         and all(isinstance(entry, DamagedSpan) for entry in read_blocks(data, 0))
     ):
-        raise wrong_file(path, "no recording", EXPECTED_FILE, "Is it the right file? Nothing was changed in it.")
+        advice = "Is it the right file? What other poses lack, `harness inspect` says. Nothing was changed."
+        raise wrong_file(path, "no recording", EXPECTED_FILE, advice)
 
 
 class RecordingWriter:

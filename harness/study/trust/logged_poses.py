@@ -16,9 +16,13 @@ def readings_of_poses(recording: PoseRecording) -> CaptureReadings:
     """The bodies of a file of poses as stations. The log's clock is both the device's and the host's."""
     log = recording.log
     note = {**recording.note, "source": "poses", "start_unix_s": log.start_unix_s}
-    sampling = tuple(describe_sampling(body.name, body.times_s) for body in log.bodies)
     readings = {body.name: _readings(body) for body in log.bodies}
-    return CaptureReadings(recording.path, note, None, readings, recording.damage, sampling)
+    return CaptureReadings(recording.path, note, None, readings, recording.damage, _sampling(log))
+
+
+def _sampling(log: PoseLog) -> tuple[str, ...]:
+    counted = log.clock if log.is_counted else ""
+    return tuple(describe_sampling(body.name, body.times_s, counted) for body in log.bodies)
 
 
 def _readings(body: BodyPoses) -> StationReadings:
@@ -48,5 +52,5 @@ def truth_of_log(log: PoseLog, stations: Sequence[str]) -> TruthMotion:
         dict(pairs),
         is_log=True,
         start_unix_s=log.start_unix_s,
-        notes=tuple(f"Reference: {describe_sampling(body.name, body.times_s)}" for body in log.bodies),
+        notes=tuple(f"Reference: {sentence}" for sentence in _sampling(log)),
     )

@@ -107,6 +107,47 @@ def test_the_program_of_optitrack_is_known(tmp_path: Path) -> None:
     assert rotations.angle_between_rad(backwards.quaternions, QUATERNIONS[::-1]).max() < 1e-6
 
 
+def test_a_take_of_many_bodies_whose_header_lines_have_no_labels(tmp_path: Path) -> None:
+    names = ("head", "hand", "foot", "hip")
+    above = ("Rigid Body",) * 4, names, ("6B29FC40CA471067", "11", "12", "13")
+    kinds = ",Rotation" * 4 + ",Position" * 3 + ",Mean Marker Error"
+    header = ["Format Version,1.22,Rotation Type,Quaternion,Length Units,Millimeters", ""]
+    header += ["," + "".join(f",{cell}" * 8 for cell in line) for line in above]
+    header += ["," + kinds * 4, "Frame,Time" + ",X,Y,Z,W,X,Y,Z," * 4]
+    path = tmp_path / "take.csv"
+    log = read_pose_log(
+        write(
+            path,
+            rows(
+                lambda n: (
+                    f"{n},{TIMES_S[n]:.4f}" + f",{numbers([*QUATERNIONS[n, XYZW], *(1e3 * POSITIONS_M[n])])},0.1" * 4
+                ),
+                header,
+            ),
+        )
+    )
+    assert log.names == names
+
+
+def test_accelerations_beside_a_quaternion_are_no_positions(tmp_path: Path) -> None:
+    header = [
+        "// Update Rate: 50.0Hz",
+        "PacketCounter,SampleTimeFine,Quat_q0,Quat_q1,Quat_q2,Quat_q3,Acc_X,Acc_Y,Acc_Z",
+    ]
+    text = rows(lambda n: f"{n},{200 * n},{numbers(QUATERNIONS[n])},0.1,0.2,9.8", header)
+    with pytest.raises(BadFile, match="no position among the columns PacketCounter"):
+        read_pose_log(write(tmp_path / "imu.txt", text))
+
+
+def test_serial_numbers_tell_bodies(tmp_path: Path) -> None:
+    text = rows(
+        lambda n: "\n".join(f"{TIMES_S[n]},LHR-{one},{pose(n)}" for one in "AB"), ["t,device_serial,x,y,z,qw,qx,qy,qz"]
+    )
+    log = read_pose_log(write(tmp_path / "rig.csv", text))
+    assert log.names == ("LHR-A", "LHR-B")
+    assert_motion(log.bodies[1])
+
+
 def test_angles_of_optitrack_are_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "take.csv", motive().replace("Rotation Type,Quaternion", "Rotation Type,XYZ"))
     with pytest.raises(BadFile, match="rotations of the type XYZ; expected quaternions"):
