@@ -29,7 +29,7 @@ class VrpnConfig:
     sensors: tuple[int, ...] | None = None
     """Sensors that these names belong to, ascending. None takes the first ones that report."""
     rate_hz: float | None = None
-    """Reports per second of each sensor, if known. None measures it."""
+    """Reports per second of each sensor, for a tracker that reports too rarely to measure it."""
 
     def __post_init__(self) -> None:
         names, sensors = self.stations or (), self.sensors
@@ -87,8 +87,6 @@ class VrpnTracker(OpenTracker):
         self._frames_begun = self._lost = False
         self._lost_messages = 0
         """Messages that UDP has lost in earlier connections."""
-        self._seen_s = self._quiet_s = self._monotonic_s()
-        """Times of the latest report, and of the latest byte or ping [s]."""
         self._pinged = False
         self._line: ServerConnection | None = None
         self._strange: set[int] = set()
@@ -177,9 +175,10 @@ class VrpnTracker(OpenTracker):
         self._sensors, self._stations = self._select(sorted(heard))
         self._unread = ", ".join(str(sensor) for sensor in sorted(heard) if sensor not in self._sensors)
         self._strange.update(heard)
-        self._rate_hz = self.config.rate_hz or self._measure_rate(reports)
+        self._rate_hz = self._measure_rate(reports)
         self._reader = ReportFrames(self._sensors, self._rate_hz)
         self._seen_s = self._quiet_s = self._monotonic_s()
+        """Times of the latest report, and of the latest byte or ping [s]."""
 
     def _listen(self, line: ServerConnection) -> list[tuple[PoseReport, float]]:
         """The first reports, and when each was received [s]."""
@@ -230,6 +229,8 @@ class VrpnTracker(OpenTracker):
         )
         distinct = sorted(set(times_us))
         if len(distinct) < _FEWEST_REPORTS:
+            if self.config.rate_hz is not None:
+                return self.config.rate_hz
             what = f"only {len(distinct)} reports of a sensor in {self._timing.longest_measure_s:g} s"
             raise BadInput(f"Port {self.port}: {what}, too few to measure the rate.", "Give it: --rate HZ.")
         return 1e6 * (len(distinct) - 1) / (distinct[-1] - distinct[0])
