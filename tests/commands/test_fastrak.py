@@ -75,3 +75,8 @@ def test_flags_of_an_is900_are_refused(flag: str, tmp_path: Path, command: Comma
     words = ["record", "fastrak:/dev/ttyUSB0", tmp_path / "one.rec", *flag.split()]
     assert f"{flag.split()[0]} with fastrak:/dev/ttyUSB0. It is for an IS-900" in command(*words, code=2).err
     assert not (tmp_path / "one.rec").exists()
+
+
+@pytest.mark.parametrize("verb", ["record", "live"])
+def test_the_help_names_its_ports(verb: str, command: Command) -> None:
+    assert "fastrak:PORT" in command(verb, "--help").out
