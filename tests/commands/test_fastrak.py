@@ -43,7 +43,7 @@ def test_emulate_gives_the_rate_of_a_fastrak(
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
-        ("--stations 6", "do not fit 6 stations"),
+        ("--stations 6", "do not fit 6 stations. The device has 1234: wear at most 4 stations,"),
         ("--stations 2 --rate 90", "It sends 120 records per second in total"),
         ("--udp 5001", "--udp with --device fastrak"),
         ("--firmware 4.1105", "--firmware with --device fastrak"),
