@@ -46,7 +46,7 @@ def add_live(verbs: Verbs) -> None:
         "--port",
         required=True,
         help="/dev/ttyUSB0, COM3, the link of an emulated pseudo terminal, tcp://HOST:PORT, udp://HOST:PORT, "
-        "vrpn:TRACKER@HOST[:PORT]",
+        "fastrak:PORT, vrpn:TRACKER@HOST[:PORT]",
     )
     text = "scenario with the stations, their mounts, the body and the examples (see `harness list`)"
     verb.add_argument("--scenario", required=True, metavar="NAME", help=text)

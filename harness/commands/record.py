@@ -41,8 +41,8 @@ def add_record(verbs: Verbs) -> None:
     )
     verb = add_verb(verbs, "record", text, run_record, "seed", "mocap")
     text = (
-        "/dev/ttyUSB0, COM3, tcp://HOST:PORT, udp://HOST:PORT, vrpn:TRACKER@HOST[:PORT], sim:SCENARIO for a simulated "
-        "line, or files of poses (TUM, EuRoC, CSV, matrices, C3D)"
+        "/dev/ttyUSB0, COM3, tcp://HOST:PORT, udp://HOST:PORT, fastrak:PORT, vrpn:TRACKER@HOST[:PORT], sim:SCENARIO "
+        "for a simulated line, or files of poses (TUM, EuRoC, CSV, matrices, C3D)"
     )
     verb.add_argument("port", nargs="+", help=text)
     verb.add_argument("file", type=Path, help="the recording to write")

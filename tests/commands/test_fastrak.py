@@ -43,7 +43,7 @@ def test_emulate_gives_the_rate_of_a_fastrak(
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
-        ("--stations 6", "do not fit 6 stations"),
+        ("--stations 6", "do not fit 6 stations. The device has 1234: wear at most 4 stations,"),
         ("--stations 2 --rate 90", "It sends 120 records per second in total"),
         ("--udp 5001", "--udp with --device fastrak"),
         ("--firmware 4.1105", "--firmware with --device fastrak"),
@@ -75,3 +75,8 @@ def test_flags_of_an_is900_are_refused(flag: str, tmp_path: Path, command: Comma
     words = ["record", "fastrak:/dev/ttyUSB0", tmp_path / "one.rec", *flag.split()]
     assert f"{flag.split()[0]} with fastrak:/dev/ttyUSB0. It is for an IS-900" in command(*words, code=2).err
     assert not (tmp_path / "one.rec").exists()
+
+
+@pytest.mark.parametrize("verb", ["record", "live"])
+def test_the_help_names_its_ports(verb: str, command: Command) -> None:
+    assert "fastrak:PORT" in command(verb, "--help").out

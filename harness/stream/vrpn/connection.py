@@ -133,7 +133,7 @@ class ServerConnection:
             packets = [] if self._datagrams not in ready else [self._datagrams.recvfrom(_READ_BYTES)]
             data = self._socket.recv(_READ_BYTES) if self._socket in ready else None
         except (OSError, ValueError) as error:
-            raise ConnectionLost(f"the connection is gone ({error})") from error
+            raise _gone(error) from error
         if data == b"":
             raise ConnectionLost("the server has closed the connection")
         if data:
@@ -162,13 +162,17 @@ class ServerConnection:
         try:
             self._socket.sendall(data)
         except OSError as error:
-            raise ConnectionLost(f"the connection is gone ({error})") from error
+            raise _gone(error) from error
 
     def close(self) -> None:
         """Close the connection; may be called twice."""
         self._socket.close()
         if self._datagrams is not None:
             self._datagrams.close()
+
+
+def _gone(error: OSError | ValueError) -> ConnectionLost:
+    return ConnectionLost(f"the connection is gone ({getattr(error, 'strerror', None) or error})")
 
 
 def _connect(address: TrackerAddress, timeout_s: float) -> socket.socket:

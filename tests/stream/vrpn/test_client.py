@@ -191,6 +191,15 @@ def test_what_is_no_working_server_is_refused_in_one_line(sent: bytes, problem: 
     assert "\n" not in str(refused.value)
 
 
+def test_a_server_that_resets_the_connection_is_refused_without_numbers_of_the_system() -> None:
+    def script(connection: socket.socket) -> None:
+        connection.recv(1)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+
+    with scripted_server(script) as port, pytest.raises(BadInput, match=r"the connection is gone \([A-Z][a-z ]+\)"):
+        open_quick(port, timing=IMPATIENT)
+
+
 def test_more_sensors_than_anyone_wears_are_refused() -> None:
     place, turn = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
     reports = b"".join(PoseReport(n, n, place, turn).encode(1, 4).encode() for n in range(1001))

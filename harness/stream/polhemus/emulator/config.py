@@ -126,6 +126,6 @@ class EmulatorConfig:
         if len(characters) != stations or "".join(c for c in known if c in characters) != characters:
             raise BadInput(
                 f"characters = {characters!r} do not fit {stations} stations.",
-                f"Give one of {known} for each, ascending.",
+                f"The device has {known}: wear at most {len(known)} stations, and give each one of these, ascending.",
             )
         return characters
