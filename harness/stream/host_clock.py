@@ -10,7 +10,8 @@ from harness.stream.frame import TrackerFrame
 _MAX_DRIFT = 1e-4
 """Greatest relative drift of the two clocks; that of quartz crystals is a tenth of it."""
 _CLOCK_RESET_S = 1.0
-"""A larger jump of the clock difference is a reset of the device's clock [s]."""
+"""A larger jump of the clock difference is a reset of the device's clock [s], unless a host that stalled is reading
+what it missed: then stamps go on, and frames are late for less than this time."""
 
 
 class HostClockEstimator:
@@ -24,7 +25,10 @@ class HostClockEstimator:
     def __init__(self) -> None:
         self._difference_s = np.inf
         """Least difference of host minus device clock."""
-        self._received_s = 0.0
+        self._received_s, self._stamp_s = 0.0, -np.inf
+        """Time of reception of the latest frame with stamps, and its latest stamp [s]."""
+        self._late_since_s: float | None = None
+        """When frames began to be later than a reset of the clock would make them [s]."""
         self._measured_s = -np.inf
         """Time of the latest frame [s]."""
 
@@ -39,10 +43,22 @@ class HostClockEstimator:
             return frame.received_s
         difference_s = frame.received_s - float(stamps_s[-1])
         drifted_s = self._difference_s + _MAX_DRIFT * max(frame.received_s - self._received_s, 0.0)
-        clock_reset = abs(difference_s - drifted_s) > _CLOCK_RESET_S
-        self._difference_s = difference_s if clock_reset else min(difference_s, drifted_s)
-        self._received_s = frame.received_s
+        is_reset = self._is_reset(frame.received_s, float(stamps_s[-1]), difference_s - drifted_s)
+        self._difference_s = difference_s if is_reset else min(difference_s, drifted_s)
+        self._received_s, self._stamp_s = frame.received_s, float(stamps_s[-1])
         return float(stamps_s.mean()) + self._difference_s
+
+    def _is_reset(self, received_s: float, stamp_s: float, jump_s: float) -> bool:
+        """Whether the device set its clock anew, by the jump of the clock difference [s]."""
+        if jump_s <= _CLOCK_RESET_S:
+            self._late_since_s = None
+            return jump_s < -_CLOCK_RESET_S
+        if self._late_since_s is None:
+            self._late_since_s = received_s
+        if stamp_s >= self._stamp_s and received_s - self._late_since_s < _CLOCK_RESET_S:
+            return False
+        self._late_since_s = None
+        return True
 
 
 class UnixTimeEstimator:

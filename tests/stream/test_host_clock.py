@@ -28,6 +28,29 @@ def test_a_device_that_sets_its_clock_anew_is_followed() -> None:
     assert clock.measured_s(frame(100.3, float("nan"))) == 100.3
 
 
+def test_a_host_that_stalls_for_seconds_reads_the_true_times_of_what_it_missed() -> None:
+    """The stamps of 2.5 s arrive at once; the device's clock goes on."""
+    clock, true_s = HostClockEstimator(), np.arange(400) / 40.0
+    received_s = np.where((true_s > 3.0) & (true_s < 5.5), 5.5 + 1e-4 * np.arange(400), true_s) + 100.0
+    found_s = [clock.measured_s(frame(r, 50.0 + t)) for r, t in zip(received_s.tolist(), true_s.tolist(), strict=True)]
+    np.testing.assert_allclose(found_s, 100.0 + true_s, atol=2e-3)
+
+
+def test_a_clock_that_is_set_anew_to_a_later_stamp_is_followed_within_a_second() -> None:
+    """In a pause of 10 s the device restarted: its stamp is 3 s later than before the pause."""
+    clock = HostClockEstimator()
+    clock.measured_s(frame(100.0, 5.0))
+    found_s = [clock.measured_s(frame(110.0 + k / 40.0, 8.0 + k / 40.0)) for k in range(80)]
+    assert found_s[39] < 110.0
+    np.testing.assert_allclose(found_s[40:], 110.0 + np.arange(40, 80) / 40.0, atol=1e-6)
+
+
+def test_a_clock_that_jumps_ahead_is_followed_at_once() -> None:
+    clock = HostClockEstimator()
+    clock.measured_s(frame(100.0, 5.0))
+    assert clock.measured_s(frame(100.1, 25.0)) == pytest.approx(100.1)
+
+
 def test_the_host_time_never_steps_back_when_the_delay_shrinks() -> None:
     """The first frames wait 180 ms in the host; then the wait ends at once."""
     clock = HostClockEstimator()
