@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Floats, Ints, freeze
+from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.motion import count_steps
 from harness.errors import BadInput, NotComparable
 from harness.measure.pose_series import MeasuredPoses, TruthPoses, TruthSpline
@@ -20,6 +20,8 @@ LEAST_GAIN = 0.1
 SPAN_S = 0.2
 """Time over which angular speeds are means [s]: over single steps, noise and rounded times hide them [choice]."""
 _FEWEST_STEPS = 20
+_RIVAL_S, _RIVAL_CORRELATION = 1.0, 0.02
+"""Two offsets this far apart [s] whose correlations differ by less than this are rivals [choice]."""
 LEAST_OVERLAP_S = 10.0
 """Shortest common motion of capture and reference [s]."""
 
@@ -49,6 +51,8 @@ class TimeOffset:
     """Correlation of the angular speeds at this offset, up to 1."""
     overlap_s: float
     """Time for which both have angular speeds at this offset [s]."""
+    rival_s: float | None = None
+    """Another offset at which a motion that repeats correlates as well [s]; None without one."""
 
 
 def angular_speed(poses: TruthSpline, period_s: float, span_s: float = SPAN_S) -> SpeedSeries:
@@ -71,8 +75,9 @@ def time_offset(
 ) -> TimeOffset:
     """Find the offset at which pairs of angular speeds correlate best; all pairs share the two clocks.
 
-    All series have one period. The offset is refined to a fraction of it by a parabola. NotComparable if no offset
-    leaves `least_overlap_s` of overlap [s].
+    All series have one period. The offset is refined to a fraction of it by a parabola. Of several offsets that
+    correlate as well, as for a motion that repeats, the one with the longest overlap is taken. NotComparable if no
+    offset leaves `least_overlap_s` of overlap [s].
     """
     period_s = first[0].period_s
     if any(abs(series.period_s - period_s) > 1e-9 * period_s for series in (*first, *second)):
@@ -100,10 +105,26 @@ def time_offset(
     correlation = np.where(enough, total[0] / np.maximum(total[1], 1e-300), -1.0)
     independent = total[2] * min(period_s / SPAN_S, 1.0)
     score = np.arctanh(np.clip(correlation, -0.999999, 0.999999)) - 3.0 / np.sqrt(np.maximum(independent - 3.0, 1.0))
-    best = int(np.argmax(np.where(enough, score, -np.inf)))
-    shift = best - (length_b - 1) + _parabola(correlation, best)
-    offset_s = origin_a - origin_b + shift * period_s
-    return TimeOffset(float(offset_s), float(correlation[best]), float(overlap_s[best]))
+    score = np.where(enough, score, -np.inf)
+    best = int(np.argmax(score))
+    rivals = _rivals(correlation, enough, best, int(_RIVAL_S / period_s))
+    best = max(best, *rivals, key=lambda lag: float(overlap_s[lag])) if len(rivals) else best
+    others = _rivals(correlation, enough, best, int(_RIVAL_S / period_s))
+
+    def offset_at(lag: int) -> float:
+        return float(origin_a - origin_b + (lag - (length_b - 1) + _parabola(correlation, lag)) * period_s)
+
+    rival_s = offset_at(max(others, key=lambda lag: float(score[lag]))) if len(others) else None
+    return TimeOffset(offset_at(best), float(correlation[best]), float(overlap_s[best]), rival_s)
+
+
+def _rivals(correlation: Floats, enough: Bools, best: int, apart: int) -> list[int]:
+    """Peaks among the correlations (L,), `apart` from the best one, that are nearly as high."""
+    peak = np.zeros(len(correlation), bool)
+    peak[1:-1] = (correlation[1:-1] >= correlation[:-2]) & (correlation[1:-1] >= correlation[2:])
+    far = np.abs(np.arange(len(correlation)) - best) > apart
+    high = correlation > correlation[best] - _RIVAL_CORRELATION
+    return [int(lag) for lag in np.flatnonzero(peak & far & enough & high)]
 
 
 def _padded(series: SpeedSeries, origin_s: float) -> Floats:

@@ -145,6 +145,8 @@ class Registration:
     """Estimates of all parameters, from which device times are mapped to those of the reference."""
     correlation: float
     """Correlation of angular speeds at the time offset."""
+    rival_s: float | None
+    """Another time offset at which they correlate as well, because the motion repeats [s]; None without one."""
     overlap_s: float
     """Time that capture and reference have in common [s]."""
     matched: float
@@ -226,7 +228,7 @@ def register_poses(
     _require_observable(fit, list(named), _PLAIN_DEVIATIONS if plain else 1.0)
     most = MOST_PLAIN_CLOCK_ERROR if plain else MOST_CLOCK_ERROR
     require_clock(fit.state.clock_ratio, float(np.sqrt(fit.covariance[CLOCK, CLOCK])), most)
-    return _result(named, grids, fit, coarse.correlation, overlap_s, matched)
+    return _result(named, grids, fit, coarse, overlap_s, matched)
 
 
 def _extent_m(position_m: Floats) -> float:
@@ -334,7 +336,7 @@ def _result(
     pairs: Mapping[str, str],
     grids: Mapping[str, StationGrid],
     fit: FittedRegistration,
-    correlation: float,
+    coarse: TimeOffset,
     overlap_s: float,
     matched: float,
 ) -> Registration:
@@ -373,7 +375,7 @@ def _result(
     room = slice(0, ROOM_ORIGIN.stop)
     return Registration(
         values, mounts, errors, explained, rotations.inverse(state.tracker_from_world), state.tracker_origin_m,
-        covariance[room, room], state, correlation, overlap_s, matched, blocks,
+        covariance[room, room], state, coarse.correlation, coarse.rival_s, overlap_s, matched, blocks,
     )  # fmt: skip
 
 

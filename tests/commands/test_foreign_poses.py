@@ -56,6 +56,22 @@ def test_stations_that_are_not_there_and_flags_of_others_are_refused(pair: tuple
     assert "without --surveyed" in command("characterize", pair[0], "--surveyed-noise", "1", code=2).err
 
 
+def test_another_offset_of_a_motion_that_repeats_is_named(tmp_path: Path, command: Command) -> None:
+    """Two cycles of 30 s, whose halves turn alike; the reference is 0.51 s ahead."""
+    rng, files = generator(5, "cycles"), (tmp_path / "a.csv", tmp_path / "b.csv")
+    for file, ahead_s, rate_hz in ((files[0], 0.0, 60.0), (files[1], 0.51, 50.0)):
+        time_s = np.arange(60.0 * rate_hz) / rate_hz
+        phase = 2.0 * np.pi / 30.0 * (time_s + ahead_s)
+        turn = sum(np.stack([np.sin(k * phase + 1.7 * k * k + i) for i in range(3)], axis=-1) for k in (1, 3, 7))
+        place = np.stack([np.sin(3.0 * phase + i) + 0.4 * np.sin(11.0 * phase + 2.0 * i) for i in range(3)], axis=-1)
+        place = 0.5 * place + 0.001 * rng.normal(size=place.shape)
+        quaternion = rotations.multiply(rotations.exp(0.4 * turn), rotations.exp(0.001 * rng.normal(size=turn.shape)))
+        rows = np.column_stack([time_s, place, np.roll(quaternion, -1, axis=1)])
+        np.savetxt(file, rows, delimiter=",", header="time,x,y,z,qx,qy,qz,qw", comments="")
+    out = " ".join(command("validate", files[0], "--truth", files[1]).out.split())
+    assert re.search(r"The motion repeats: a time offset of ((15|30|45)\.51|−(14|29|44)\.49) s fits", out)
+
+
 def test_rests_on_surveyed_points(tmp_path: Path, command: Command) -> None:
     rng = generator(3, "survey")
     points_m = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.5, 0.5, 0.8]])

@@ -152,3 +152,20 @@ def test_noise_exchanges_nothing(rng: np.random.Generator) -> None:
     stated = dict(zip(NAMES, NAMES, strict=True))
     for _ in range(5):
         assert identify_stations(stations(stated | {"b": "a"}, rng, noise_rad=0.02), alike, stated) == stated
+
+
+def test_of_offsets_of_a_motion_that_repeats_the_longest_overlap_is_taken(rng: np.random.Generator) -> None:
+    """Two cycles later readings without noise fit a little better; that is the rival."""
+    cycle = series(rng, 1500)
+    reference, measured = np.tile(cycle, 3), np.tile(cycle, 3)[100:4000]
+    measured[:2400] += 0.1 * cycle.std() * rng.normal(size=2400)
+    found = time_offset([SpeedSeries(0.0, PERIOD_S, measured)], [SpeedSeries(0.0, PERIOD_S, reference)])
+    assert found.offset_s == pytest.approx(-100 * PERIOD_S, abs=PERIOD_S)
+    assert found.overlap_s == pytest.approx(3900 * PERIOD_S, abs=30 * PERIOD_S)
+    assert found.rival_s == pytest.approx((3000 - 100) * PERIOD_S, abs=PERIOD_S)
+
+
+def test_a_motion_that_does_not_repeat_has_no_rival(rng: np.random.Generator) -> None:
+    signal = series(rng, 4000)
+    found = time_offset([SpeedSeries(0.0, PERIOD_S, signal[100:])], [SpeedSeries(0.0, PERIOD_S, signal)])
+    assert found.rival_s is None

@@ -158,11 +158,22 @@ def validate_capture(
             *_describe_clocks(capture, truth, registration),
             *(describe_explained(registration) if wire is None else ()),
             *describe_left_out(registration.errors),
+            *_describe_rival(registration),
             *truth.notes,
             "Errors are those after the registration: constant errors of room and mounts are in its numbers.",
         ),
     )
     return Validation(capture, truth, poses, bodies, registration, exchanged, report)
+
+
+def _describe_rival(registration: Registration) -> tuple[str, ...]:
+    """A sentence on another time offset that fits the angular speeds as well."""
+    if registration.rival_s is None:
+        return ()
+    return (
+        f"The motion repeats: a time offset of {format_fixed(registration.rival_s, 2)} s fits the angular speeds as "
+        "well. That with the longest overlap was taken.",
+    )
 
 
 def _comparable_poses(capture: CaptureReadings, truth: TruthMotion) -> tuple[dict[str, MeasuredPoses], tuple[str, ...]]:
