@@ -62,7 +62,8 @@ def test_another_offset_of_a_motion_that_repeats_is_named(tmp_path: Path, comman
     for file, ahead_s, rate_hz in ((files[0], 0.0, 60.0), (files[1], 0.51, 50.0)):
         time_s = np.arange(60.0 * rate_hz) / rate_hz
         phase = 2.0 * np.pi / 30.0 * (time_s + ahead_s)
-        turn = sum(np.stack([np.sin(k * phase + 1.7 * k * k + i) for i in range(3)], axis=-1) for k in (1, 3, 7))
+        waves = [[np.sin(k * phase + 1.7 * k * k + i) for i in range(3)] for k in (1, 3, 7)]
+        turn = np.moveaxis(np.sum(waves, axis=0), 0, -1)
         place = np.stack([np.sin(3.0 * phase + i) + 0.4 * np.sin(11.0 * phase + 2.0 * i) for i in range(3)], axis=-1)
         place = 0.5 * place + 0.001 * rng.normal(size=place.shape)
         quaternion = rotations.multiply(rotations.exp(0.4 * turn), rotations.exp(0.001 * rng.normal(size=turn.shape)))

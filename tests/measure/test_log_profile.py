@@ -213,7 +213,7 @@ def test_a_log_of_few_poses_is_refused() -> None:
 
 def test_steps_that_are_equal_show_no_resolution_and_no_jitter(rng: np.random.Generator) -> None:
     body = resting(rng, 30.0)
-    even = BodyPoses("tracker", 0.02 * np.arange(len(body.times_s)), body.positions_m, body.quaternions)
+    even = BodyPoses("tracker", 0.02 * np.arange(float(len(body.times_s))), body.positions_m, body.quaternions)
     timing = measure_log_profile(log_of(even)).timing.all_stations
     assert timing["timing.jitter_s"].value == 0.0
     assert "equal" in timing["timing.stamp_resolution_s"].reason
