@@ -21,20 +21,20 @@ def bench_foreign() -> list[BenchmarkStatement]:
     folder = real_folder()
     rows = [row for pair in stream_pairs(folder) for row in pair_statements(pair)]
     files = sorted((folder / "hand_eye").glob("*/*.csv"))
-    rows += [_stream_row(f"{path.parent.name} {path.stem}", [path], PoseFileOptions()) for path in files]
+    rows += [describe_stream(path) for path in files]
     matrices = matrix_files(folder)
     if matrices:
         rows += _matrix_rows(matrices)
     return rows
 
 
-def _stream_row(name: str, files: list[Path], options: PoseFileOptions) -> BenchmarkStatement:
-    """What `characterize` shows of a stream of a moving body."""
-    profile = characterize_log(open_poses(files, options)).profile
-    timing, (noise, *_) = profile.timing.all_stations, [note for note in profile.limits if "at most" in note]
+def describe_stream(path: Path) -> BenchmarkStatement:
+    """What `characterize` shows of a file of one moving body, with its notes."""
+    profile = characterize_log(open_poses([path], PoseFileOptions())).profile
+    timing, notes = profile.timing.all_stations, [note.partition(": ")[2] for note in profile.limits]
     rate, lost, twice = (timing[f"timing.{key}"] for key in ("rate_hz", "lost_share", "duplicate_share"))
     measured = f"{rate.scaled(1.0, 'Hz')}, lost {100.0 * lost.value:.1f} %, repeated {100.0 * twice.value:.1f} %"
-    return state_verdict(f"{name}: characterize", "", measured, None, noise.partition(": ")[2])
+    return state_verdict(f"{path.parent.name} {path.stem}: characterize", "", measured, None, " ".join(notes))
 
 
 def _matrix_rows(files: list[Path]) -> list[BenchmarkStatement]:

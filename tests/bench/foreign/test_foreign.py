@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from harness.bench.foreign import references
+from harness.bench.foreign.benchmark import describe_stream
 from harness.bench.foreign.pair_statements import pair_statements
 from harness.bench.foreign.streams import NoRealStreams, StreamPair, real_folder, stream_pairs
 from harness.core import rotations
@@ -94,6 +95,15 @@ def test_a_refused_pair_has_its_reason_and_no_verdict(rng: np.random.Generator, 
     (row,) = pair_statements(write_pair(tmp_path, *foreign_pair(rng, Source(QUIET, turns=(0.8, 0.0, 0.0)))))
     assert (row.verdict, row.target) == ("", "")
     assert "one axis only" in row.measured
+
+
+def test_a_stream_is_described_with_its_rate_and_the_scatter_of_neighbours(
+    rng: np.random.Generator, tmp_path: Path
+) -> None:
+    described = describe_stream(write_pair(tmp_path / "set", *foreign_pair(rng, Source(QUIET))).capture)
+    assert described.text == "set phone: characterize"
+    assert "Hz" in described.measured
+    assert "scatter" in described.reference
 
 
 def test_streams_are_paired_with_the_best_reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
