@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.commands.flags import (
-    FASTRAK_PREFIX,
     LINE_FLAGS,
     Verbs,
     add_line_flags,
@@ -21,7 +20,7 @@ from harness.commands.flags import (
 from harness.commands.output import print_result, print_status, recording_note, show_progress, this_command
 from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
 from harness.commands.unit_results import UnitOptions, add_unit_flags, departure_content, read_expected, write_unit
-from harness.core.network import VRPN_PREFIX
+from harness.core.network import FASTRAK_PREFIX, VRPN_PREFIX
 from harness.core.package_data import VERSION
 from harness.core.progress import ProgressBar
 from harness.errors import BadFile, BadInput, Outcome

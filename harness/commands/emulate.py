@@ -8,7 +8,6 @@ from contextlib import ExitStack, closing, suppress
 from typing import TYPE_CHECKING
 
 from harness.commands.flags import (
-    FASTRAK_PREFIX,
     Verbs,
     add_verb,
     add_vrpn_flag,
@@ -29,7 +28,7 @@ from harness.commands.playback_flags import (
     parse_device_stations,
 )
 from harness.core.interrupts import defer_interrupts
-from harness.core.network import LOOPBACK
+from harness.core.network import FASTRAK_PREFIX, LOOPBACK
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:

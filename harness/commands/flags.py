@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.core.network import VRPN_PREFIX
+from harness.core.network import FASTRAK_PREFIX, VRPN_PREFIX
 from harness.core.options import expand_alternatives, split_outside_brackets
 from harness.core.output_place import place_fault
 from harness.errors import BadFile, BadInput, Outcome
@@ -22,8 +22,6 @@ MOST_PROCESSES = 1024
 """Most worker processes on one computer [choice]."""
 LINE_FLAGS = ("items", "baud", "quality", "keep_settings", "boresight", "alignment")
 """Flags of `add_line_flags`, as attributes of the parsed command line."""
-FASTRAK_PREFIX = "fastrak:"
-"""Beginning of a port at which a FASTRAK is."""
 STATION_CHARACTERS = "123456789ABC"
 """Characters of the stations that a device may have (docs/is900.md 5)."""
 Action = Callable[[argparse.Namespace], Outcome]

@@ -6,8 +6,8 @@ from typing import Any
 from harness.errors import BadInput
 
 LOOPBACK = "127.0.0.1"
-VRPN_PREFIX = "vrpn:"
-"""Beginning of a port that is a tracker of a VRPN server."""
+VRPN_PREFIX, FASTRAK_PREFIX = "vrpn:", "fastrak:"
+"""Beginnings of ports: a tracker of a VRPN server, and a line at which a FASTRAK is."""
 _LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from harness.core.network import FASTRAK_PREFIX
 from harness.errors import BadInput
 from harness.stream.fastrak.items import FASTRAK_ITEMS, FASTRAK_LIST
 from harness.stream.line_events import LineEvent, LineObserver
@@ -23,7 +24,7 @@ from harness.stream.polhemus.driver.rate import (
     rates_agree,
     too_few_records_error,
 )
-from harness.stream.polhemus.driver.transport import FASTRAK_PREFIX, LineLost
+from harness.stream.polhemus.driver.transport import LineLost
 
 ALL_STATES = station_command("l", "1")
 """Query of the states of all stations: the reply for station 1 tells those of 2, 3 and 4 too."""

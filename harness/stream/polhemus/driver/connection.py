@@ -6,13 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+from harness.core.network import FASTRAK_PREFIX
 from harness.errors import BadInput
 from harness.stream.line_events import LineObserver
 from harness.stream.polhemus.codec.commands import RESUME, STATUS, STOP
 from harness.stream.polhemus.codec.items import BAUD_RATES, DEVICE_NAMES, with_article
 from harness.stream.polhemus.codec.replies import DeviceError, ParsedReply, StatusRecord, parse_reply
 from harness.stream.polhemus.driver.config import DriverTiming, LineConfig
-from harness.stream.polhemus.driver.transport import FASTRAK_PREFIX, LineLost, Transport, family_of, open_transport
+from harness.stream.polhemus.driver.transport import LineLost, Transport, family_of, open_transport
 from harness.stream.tracker import DriverClosed
 
 

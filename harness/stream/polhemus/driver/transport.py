@@ -21,7 +21,7 @@ from urllib.parse import urlsplit
 import serial
 from serial.tools import list_ports
 
-from harness.core.network import resolve_host
+from harness.core.network import FASTRAK_PREFIX, resolve_host
 from harness.errors import BadInput, HarnessError
 from harness.stream.polhemus.codec.datagram import DATAGRAM_START
 from harness.stream.polhemus.codec.items import BAUD_RATES, DeviceFamily
@@ -109,8 +109,6 @@ else:
 
     _IO_ERRORS = (OSError, ValueError, termios.error)
 UDP_SCHEME = "udp://"
-FASTRAK_PREFIX = "fastrak:"
-"""Beginning of the name of a port at which a FASTRAK is, such as fastrak:/dev/ttyUSB0."""
 READ_BYTES = 65536
 """More than any operating system buffers for a port [bytes]."""
 MAX_PACKETS = 100
