@@ -6,7 +6,7 @@ from harness.errors import BadInput
 
 LENGTH_UNITS_M = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048}
 """Unit of length -> metres."""
-TIME_UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+TIME_UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "100ns": 1e-7, "ns": 1e-9}
 """Unit of time -> seconds."""
 ANGLE_UNITS_RAD = {"deg": math.pi / 180.0, "rad": 1.0}
 """Unit of angle -> radians."""

@@ -2,57 +2,33 @@
 
 import re
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.units import ANGLE_UNITS_RAD, LENGTH_UNITS_M, TIME_UNITS_S, find_unit
 from harness.errors import BadFile
-from harness.stream.poses.column_names import AXES, ColumnName, parse_column_name
+from harness.stream.poses.column_groups import COLUMNS_ADVICE, EXPECTED_COLUMNS, QUATERNION, BodyColumns, group_columns
+from harness.stream.poses.column_names import ColumnName, parse_column_name
 from harness.stream.poses.number_table import TableHead
 from harness.stream.poses.pose_log import FileFinding
 
-EXPECTED_COLUMNS = "columns of a time, a position and a quaternion"
 NORM_TOLERANCE = 0.01
 """Largest deviation of a quaternion's norm from 1."""
-_ADVICE = (
-    "Name the columns in their order, - for others: --columns time,x,y,z,qx,qy,qz,qw; of angles roll,pitch,yaw with "
-    "--euler."
-)
 _LABELS = {"id", "parent", "asset id"}
 """First words of header lines that name neither bodies nor columns."""
 _IDENTIFIER = re.compile(r"(?=[a-f]*\d)[0-9a-f]+")
 """An identifier of OptiTrack's program, in lower case."""
-_QUATERNION = ("w", "x", "y", "z")
-_MATRICES = [set("012345678"), *({f"{r}{c}" for r in three for c in three} for three in ("012", "123"))]
-"""Names of the elements of a matrix: column by column, or by row and column."""
-_TRANSLATIONS = [("03", "13", "23"), ("14", "24", "34")]
 _RATES = ("export frame rate", "capture frame rate", "frequency", "objects", "segments")
 """Names of the rate in the headers of OptiTrack's, Qualisys' and Vicon's programs."""
-_PROGRAMS = {"take name": "OptiTrack", "rotation type": "OptiTrack", "body_names": "Qualisys", "program": "DTrack"}
+_PROGRAMS = {"take name": "OptiTrack", "rotation type": "OptiTrack", "body_names": "Qualisys", "dtrack": "DTrack"}
 """Name in the header -> what writes it."""
 MILLIMETRE_PROGRAMS = ("Qualisys", "DTrack")
 """Programs that write lengths in mm, without a word about it."""
 _MOST_NAMED = 8
 """Most columns that are named one by one as not read."""
-
-
-@dataclass(frozen=True)
-class BodyColumns:
-    """Columns of one body, from 0."""
-
-    name: str
-    """"" where the file does not name it."""
-    position: tuple[int, ...]
-    """(3,) x, y, z."""
-    rotation: tuple[int, ...]
-    """(4,) components of a quaternion in the order in which they stand in the file, (9,) a matrix column by column, or
-    (3,) angles about x, y, z."""
-    valid: tuple[int, ...] = ()
-    """Columns that are 0 where the body is not tracked."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +70,7 @@ def find_columns(head: TableHead, names: Sequence[str] | None = None, *, angles:
     if names is not None:
         if len(names) > head.columns:
             found = f"{head.columns} columns, where --columns names {len(names)}"
-            raise BadFile(head.path, found, "no more names than columns", _ADVICE)
+            raise BadFile(head.path, found, "no more names than columns", COLUMNS_ADVICE)
         paths = [(name,) for name in (*names, *["-"] * (head.columns - len(names)))]
         return _from_names(head, paths, "given by --columns", {}, angles=angles)
     facts = _facts(head.header)
@@ -106,7 +82,7 @@ def find_columns(head: TableHead, names: Sequence[str] | None = None, *, angles:
     scores = [sum(parse_column_name([cell]).kind not in ("", "body") for cell in row) for row in rows]
     best = max(range(len(rows)), key=lambda n: (scores[n], n), default=None)
     own = [] if best is None else [parse_column_name([cell]) for cell in rows[best]]
-    turn = {name.axis for name in own if name.kind == "quaternion"} == set(_QUATERNION)
+    turn = {name.axis for name in own if name.kind == "quaternion"} == set(QUATERNION)
     if best is None or (scores[best] < min(6, head.columns) and not turn):
         return _from_numbers(head)
     above = [_spread(row) for row in _context(rows[:best], _program(facts))]
@@ -169,21 +145,6 @@ def _facts(header: Sequence[Sequence[str]]) -> dict[str, str]:
     return {name.lower(): value for name, value in pairs if name and value}
 
 
-@dataclass
-class _Group:
-    """Columns of one body while they are collected."""
-
-    name: str
-    family: str
-    columns: dict[str, int] = field(default_factory=dict)
-
-    def sorted_columns(self) -> tuple[int, ...]:
-        """A quaternion's as they stand in the file, a matrix's column by column, those of angles as x, y, z."""
-        if len(self.columns) == len(_QUATERNION):
-            return tuple(sorted(self.columns.values()))
-        return tuple(self.columns[axis] for axis in sorted(self.columns, key=lambda axis: axis[::-1]))
-
-
 def _from_names(
     head: TableHead,
     paths: Sequence[Sequence[str]],
@@ -194,28 +155,7 @@ def _from_names(
     angles: bool,
 ) -> TableColumns:
     names = [parse_column_name(path) if path[-1] != "-" else ColumnName("") for path in paths]
-    groups: dict[str, list[_Group]] = {"position": [], "quaternion": [], "matrix": [], "angle": []}
-    for c, name in enumerate(names):
-        if name.kind in groups and c not in head.text_columns:
-            same = [group for group in groups[name.kind] if (group.name, group.family) == (name.body, name.family)]
-            free = next((group for group in same if name.axis not in group.columns), None)
-            if free is None:
-                groups[name.kind].append(free := _Group(name.body, name.family))
-            free.columns[name.axis] = c
-    places = [group for group in groups["position"] if set(group.columns) == set(AXES)]
-    turns = [group for group in groups["quaternion"] if set(group.columns) == set(_QUATERNION)]
-    for group in () if places else groups["matrix"]:  # of three or four lines, with the position on the right
-        if last := next((names for names in _TRANSLATIONS if group.columns.keys() >= {*names}), ()):
-            at = {axis: group.columns.pop(name) for axis, name in zip(AXES, last, strict=True)}
-            places.append(_Group(group.name, group.family, at))
-            group.columns = {name: c for name, c in group.columns.items() if set(name) <= {n[0] for n in last}}
-    turns = turns or [group for group in groups["matrix"] if set(group.columns) in _MATRICES]
-    if not turns and angles:
-        turns = [group for kind in ("angle", "quaternion") for group in groups[kind] if set(group.columns) == set(AXES)]
-    valid = [(c, name.body) for c, name in enumerate(names) if name.kind == "valid" and c not in head.text_columns]
-    bodies = _pair(places, turns, valid)
-    if not bodies:
-        raise _missing(head.path, groups, paths)
+    bodies = group_columns(head.path, names, paths, head.text_columns, angles=angles)
     chosen = [c for body in bodies for c in (*body.position, *body.rotation, *body.valid)]
     time, frame = _first(names, "time", head.text_columns), _first(names, "frame", head.text_columns)
     nanoseconds = _first(names, "nanoseconds", head.text_columns)
@@ -229,20 +169,7 @@ def _from_names(
     lengths.add(next((find_unit(facts[key], LENGTH_UNITS_M) for key in ("length units", "units") if key in facts), ""))
     lengths.add("mm" if program in MILLIMETRE_PROGRAMS else "")
     rate = next((facts[key] for key in _RATES if key in facts), "")
-    shown = ["/".join(filter(None, path)) for path in paths]
-    text = ", ".join(shown[c] for c in sorted((*bodies[0].position, *bodies[0].rotation)))
-    text = text if time is None else f"{paths[time][-1]}, {text}"
-    findings = [FileFinding("columns", text + (", ..." if len(bodies) > 1 else ""), source)]
-    if len(bodies[0].rotation) == 9:
-        by_number = "0" in turns[0].columns
-        reason = "the order of Qualisys and DTrack" if by_number else "the names count rows and columns"
-        findings.append(FileFinding("rotation", "matrix" + ", column by column" * by_number, reason))
     used = {*chosen, time, nanoseconds, body_column, frame}
-    if rest := list(
-        dict.fromkeys(shown[c] for c in range(len(shown)) if c not in used and paths[c][-1] not in ("", "-"))
-    ):
-        more = f" and {len(rest) - _MOST_NAMED} others" if len(rest) > _MOST_NAMED else ""
-        findings.append(FileFinding("not read", ", ".join(rest[:_MOST_NAMED]) + more, "not needed for times and poses"))
     return TableColumns(
         bodies,
         time,
@@ -258,46 +185,36 @@ def _from_names(
         order_reason="q0 is the real part in most programs" if any(names[c].numbered for c in chosen) else source,
         angle_unit=max(names[c].unit or _unit_of(units, c, ANGLE_UNITS_RAD) for c in bodies[0].rotation),
         program=program,
-        findings=tuple(findings),
+        findings=_describe(bodies, names, paths, source, time, used),
     )
 
 
-def _pair(
-    places: Sequence[_Group], turns: Sequence[_Group], valid: Sequence[tuple[int, str]]
-) -> tuple[BodyColumns, ...]:
-    """Positions and rotations of the same body; those of the only body may have different names.
-
-    `valid` are columns and the names of their bodies; one without a body that is there counts for all.
-    """
-    pairs = [(place, turn) for place, turn in zip(places, turns, strict=False) if place.name == turn.name]
-    if len(places) == len(turns) == 1:
-        pairs = [(places[0], turns[0])]
-    elif len(pairs) < max(len(places), len(turns)):
-        by_name = {turn.name: turn for turn in turns}
-        pairs = [(place, by_name[place.name]) for place in places if place.name in by_name]
-    known = {place.name or turn.name for place, turn in pairs}
-    return tuple(
-        BodyColumns(
-            (name := place.name or turn.name),
-            tuple(place.columns[axis] for axis in AXES),
-            turn.sorted_columns(),
-            tuple(c for c, body in valid if body == name or body not in known),
-        )
-        for place, turn in pairs
-    )
-
-
-def _missing(path: Path, groups: Mapping[str, Sequence[_Group]], paths: Sequence[Sequence[str]]) -> BadFile:
-    has_place = any(set(group.columns) == set(AXES) for group in groups["position"])
-    has_turn = any(set(group.columns) == set(_QUATERNION) for group in groups["quaternion"])
-    angles = [paths[c][-1] for kind in ("angle", "quaternion") for g in groups[kind] for c in g.columns.values()]
-    if has_place and not has_turn and len(angles) >= len(AXES):
-        found = f"angles ({', '.join(angles[:6])}) of a convention that the file does not name"
-        advice = "Export quaternions, or name the axes in their order: --euler zyx is yaw, then pitch, then roll."
-        return BadFile(path, found, "quaternions or matrices", advice)
-    lacks = "position" if not has_place else "quaternion" if not has_turn else "body with both of them"
-    shown = ", ".join("/".join(filter(None, path)) for path in paths[:12])
-    return BadFile(path, f"no {lacks} among the columns {shown}", EXPECTED_COLUMNS, _ADVICE)
+def _describe(
+    bodies: Sequence[BodyColumns],
+    names: Sequence[ColumnName],
+    paths: Sequence[Sequence[str]],
+    source: str,
+    time: int | None,
+    used: Container[int | None],
+) -> tuple[FileFinding, ...]:
+    """What the columns of the first body are, and which columns nothing uses."""
+    shown, first = ["/".join(filter(None, path)) for path in paths], bodies[0]
+    text = [
+        *([] if time is None else [paths[time][-1]]),
+        *(shown[c] for c in sorted((*first.position, *first.rotation))),
+    ]
+    findings = [FileFinding("columns", ", ".join([*text, *["..."] * (len(bodies) > 1)]), source)]
+    if len(first.rotation) == 9:
+        by_number = len(names[first.rotation[0]].axis) == 1
+        reason = "the order of Qualisys and DTrack" if by_number else "the names count rows and columns"
+        findings.append(FileFinding("rotation", "matrix" + ", column by column" * by_number, reason))
+    named = [c for c, path in enumerate(paths) if c not in used and path[-1] not in ("", "-")]
+    if rest := list(dict.fromkeys(shown[c] for c in named)):
+        more = f" and {len(rest) - _MOST_NAMED} others" if len(rest) > _MOST_NAMED else ""
+        unknown = any(names[c].kind == "valid" for c in named)
+        reason = "not needed for times and poses" + ", or words of unknown meaning" * unknown
+        findings.append(FileFinding("not read", ", ".join(rest[:_MOST_NAMED]) + more, reason))
+    return tuple(findings)
 
 
 def _first(names: Sequence[ColumnName], kind: str, without: Container[int] = ()) -> int | None:
@@ -327,7 +244,7 @@ def _from_numbers(head: TableHead) -> TableColumns:
         what += f"; columns {last[0] + 1} to {last[-1] + 1} have the norm {np.median(norms):.4g}"
     if len(number) < 7:
         what = f"rows of {len(number)} numbers, where a pose has 7, or 12 in a matrix"
-    raise BadFile(head.path, what, EXPECTED_COLUMNS, _ADVICE)
+    raise BadFile(head.path, what, EXPECTED_COLUMNS, COLUMNS_ADVICE)
 
 
 def _has_norm_1(head: TableHead, columns: Sequence[int]) -> bool:

@@ -7,6 +7,7 @@ manual, appendix B.2). Bodies that are not tracked are missing, or have a qualit
 
 import io
 import re
+import sys
 from collections.abc import Iterator
 
 _FIRST_LINE = re.compile(r"fr \d+\s*")
@@ -31,8 +32,9 @@ class DTrackText(io.TextIOBase):
         self._file, self._lines, self._rest = file, _table_lines(file), ""
 
     def read(self, size: int | None = -1) -> str:
-        """The next `size` characters; fewer at the end."""
-        parts, length, size = [self._rest], len(self._rest), size or -1
+        """The next `size` characters, fewer at the end; all of them without a size."""
+        size = sys.maxsize if size is None or size < 0 else size
+        parts, length = [self._rest], len(self._rest)
         while length < size and (line := next(self._lines, "")):
             parts.append(line)
             length += len(line)
@@ -61,7 +63,7 @@ def _table_lines(file: io.TextIOWrapper) -> Iterator[str]:
         elif keyword in _NAMES:
             if not clock:
                 clock = "frame,time [s]" if time_s else "frame"
-                yield "program,DTrack\n"
+                yield "DTrack,log\n"
                 yield clock + _COLUMNS
             bodies = _BODY.findall(rest)
             for number, quality, position, matrix in bodies:

@@ -11,6 +11,8 @@ from harness.stream.poses.pose_log import FileFinding
 
 UNIX_S = (6.3e8, 4.1e9)
 """Range of Unix times that are taken for such: 1990 to 2099 [s] [choice]."""
+_TICK, _TICKS = "100ns", (6.3e17, 6.8e17)
+"""Unit of the ticks of .NET since the year 1, and their range from 1997 to 2155: as Unix times in ns, 1989 to 1991."""
 _STEP_S = (2e-4, 10.0)
 """Range of steps between Unix times of which the unit is believed [s]."""
 _USUAL_RATE_HZ = 60.0
@@ -44,13 +46,16 @@ def conclude_time_unit(times: Floats, stated: str, given: str | None) -> FileFin
     steps = np.diff(times)
     steps = steps[steps > 0.0]
     step = float(np.median(steps)) if len(steps) else 0.0
+    if _TICKS[0] <= times[0] <= _TICKS[1]:
+        return FileFinding("time unit", _TICK, "the first time is one of .NET, counted from the year 1")
     for name, unit_s in TIME_UNITS_S.items():
         if UNIX_S[0] <= times[0] * unit_s <= UNIX_S[1] and (not step or _STEP_S[0] <= step * unit_s <= _STEP_S[1]):
             day = datetime.fromtimestamp(float(times[0] * unit_s), UTC).date()
             return FileFinding("time unit", name, f"the first time is a Unix time of {day}")
     if not step:
         return FileFinding("time unit", "s", "there is one time only", assumed=True)
-    name = min(TIME_UNITS_S, key=lambda each: abs(np.log(step * TIME_UNITS_S[each] * _USUAL_RATE_HZ)))
+    usual = [each for each in TIME_UNITS_S if each != _TICK]
+    name = min(usual, key=lambda each: abs(np.log(step * TIME_UNITS_S[each] * _USUAL_RATE_HZ)))
     step_s = step * TIME_UNITS_S[name]
     doubtful = not 1e-3 <= step_s <= 0.4
     return FileFinding("time unit", name, f"the median step of {step:.6g} is then {1e3 * step_s:.4g} ms", doubtful)

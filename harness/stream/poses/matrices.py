@@ -48,13 +48,19 @@ def split_matrices(head: TableHead, numbers: Floats) -> tuple[Floats | None, Flo
 
 
 def convert_matrices(path: Path, matrices: Floats) -> Floats:
-    """Quaternions (N, 4) w, x, y, z of matrices (N, 3, 3). Raises BadFile for those that are no rotations."""
-    deviation = _deviation(matrices)
-    if not (deviation < _MOST_DEVIATION).all():
-        at = int(np.flatnonzero(~(deviation < _MOST_DEVIATION))[0])
-        found = f"matrix {at + 1} whose axes are not of length 1 and right angles, or that mirrors"
+    """Quaternions (N, 4) w, x, y, z of matrices (N, 3, 3); zeros for matrices of zeros or that miss numbers.
+
+    Raises BadFile for other matrices that are no rotations.
+    """
+    present = np.isfinite(matrices).all(axis=(1, 2)) & matrices.any(axis=(1, 2))
+    wrong = np.flatnonzero(present & ~(_deviation(matrices) < _MOST_DEVIATION))
+    if len(wrong):
+        found = f"matrix {wrong[0] + 1} whose axes are not of length 1 and right angles, or that mirrors"
         raise BadFile(path, found, "rotation matrices", "Is it the right file?")
-    return rotations.from_matrix(rotations.nearest_rotation(matrices))
+    out = np.zeros((len(matrices), 4))
+    if present.any():
+        out[present] = rotations.from_matrix(rotations.nearest_rotation(matrices[present]))
+    return out
 
 
 def _rows_of_matrix(rows: Floats) -> int:

@@ -37,10 +37,10 @@ _COMMENT = re.compile(r"\s*(#|%|//)+")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,9})?")
 _WORDS = {
     **dict.fromkeys(("", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"), np.nan),
-    **{"true": 1.0, "false": 0.0},
+    **{"true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0, "wahr": 1.0, "falsch": 0.0},
 }
 """Words in columns of numbers -> what they stand for."""
-_NUMBER_WORD = re.compile(r'[ "]*(true|false|[\d/-]*[T_ ]?\d+:\d\d:)', re.IGNORECASE)
+_NUMBER_WORD = re.compile(r'[ "]*(true|false|yes|no|wahr|falsch|[\d/-]*[T_ ]?\d+:\d\d:)', re.IGNORECASE)
 _MARKUP = {"JSON": re.compile(r'\s*(\{|\[\s*[\[{"])'), "XML": re.compile(r"\s*<[?!\w]")}
 """Text that is no table -> how it begins."""
 _FORMS = ((",", "."), (";", "."), ("\t", "."), (None, "."), (";", ","), ("\t", ","), (None, ","))
@@ -120,15 +120,17 @@ def read_head(path: Path) -> TableHead:
     first_line = 0
     if _count_numbers(last, separator, decimal) >= 2 and columns <= MOST_COLUMNS:
         for number, line in numbered:
-            row_cells = tuple(_split(_COMMENT.sub("", line, count=1), separator))
-            row = None if _COMMENT.match(line) else _parse_row(row_cells, columns, texts, decimal)
-            if row is not None and (rows or np.isfinite(row).sum() >= min(2, columns - len(texts))):
+            comment = _COMMENT.match(line)
+            row_cells = tuple(_split(line[comment.end() :] if comment else line, separator))
+            row = None if comment else _parse_row(row_cells, columns, texts, decimal)
+            fewest = 1 if all(row_cells) else min(2, columns - len(texts))
+            if row is not None and (rows or np.isfinite(row).sum() >= fewest):
                 first_line = first_line or number
                 rows.append(row)
                 above = [*above, row_cells][:_MOST_ABOVE]
             elif not rows:
                 header.append(row_cells)
-            elif len(rows) <= _MOST_ABOVE and np.isnan([row[0] for row in rows]).all():
+            elif not comment and len(rows) <= _MOST_ABOVE and np.isnan([row[0] for row in rows]).all():
                 header += [*above, row_cells]
                 rows, above, first_line = [], [], 0
     if not rows:

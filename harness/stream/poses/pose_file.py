@@ -11,10 +11,11 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.units import ANGLE_UNITS_RAD
-from harness.errors import BadInput
+from harness.errors import BadFile, BadInput
 from harness.stream.poses.clock_text import DAY_S
+from harness.stream.poses.column_groups import BodyColumns
 from harness.stream.poses.column_names import AXES
-from harness.stream.poses.columns import BodyColumns, TableColumns, find_columns
+from harness.stream.poses.columns import TableColumns, find_columns
 from harness.stream.poses.evidence import conclude_angle_unit
 from harness.stream.poses.matrices import convert_matrices, holds_matrices, split_matrices
 from harness.stream.poses.number_table import NumberTable, TableHead, read_head, read_rows
@@ -75,8 +76,8 @@ def _read_file(path: Path, options: PoseFileOptions) -> PoseLog:
     if table.left_out:
         findings.append(FileFinding("left out", ", ".join(table.left_out), "they are no rows"))
     place = {c: n for n, c in enumerate(read)}
-    times = _times(table.numbers[:, : len(clock)], dated=columns.dated)
     angle_unit = _angle_unit(table, columns, place, options, findings) if options.euler else 1.0
+    times = _times(table.numbers[:, : len(clock)], dated=columns.dated)
     raw = []
     for name, body, rows in _split_bodies(path, columns, table):
         numbers, own_times = (table.numbers, times) if rows is None else (table.numbers[rows], times[rows])
@@ -86,10 +87,13 @@ def _read_file(path: Path, options: PoseFileOptions) -> PoseLog:
             findings.append(FileFinding(f"untracked rows of {name}", f"{lost} of {len(tracked)} left out", reason))
             numbers, own_times = numbers[tracked], own_times[tracked]
         turns = numbers[:, [place[c] for c in body.rotation]]
-        quaternions = _quaternions(path, turns, angle_unit, (options.euler or "")[:3])
+        quaternions = _quaternions(path, turns, angle_unit, (options.euler or "")[: len(AXES)])
         raw.append(RawPoses(name, own_times, numbers[:, [place[c] for c in body.position]], quaternions))
+        del numbers, own_times
+    if not any(len(one.times) for one in raw):
+        raise BadFile(path, "no row that its column of validity calls tracked", "poses", "Name the columns: --columns.")
     ends_whole = table.ends_whole
-    del table, times, numbers, own_times
+    del table, times
     return convert_poses(path, options, columns, raw, findings, counted=columns.time is None, cut=not ends_whole)
 
 
@@ -135,20 +139,14 @@ def _angle_unit(
 
 
 def _quaternions(path: Path, turns: Floats, angle_unit: float, euler: str) -> Floats:
-    """Quaternions (N, 4) of matrices (N, 9), column by column, or angles (N, 3), w first; others (N, 4) stay.
-
-    Zeros stand for rows without a rotation.
-    """
-    if turns.shape[1] == 4:
-        return turns
-    out = np.zeros((len(turns), 4))
-    rows = np.flatnonzero(np.isfinite(turns).all(axis=1) & ((turns.shape[1] == 3) | turns.any(axis=1)))
-    if turns.shape[1] == 3:
-        about = [rotations.exp(angle_unit * turns[rows, n, None] * np.eye(3)[n]) for n in map(AXES.index, euler)]
-        out[rows] = functools.reduce(rotations.multiply, about)
-    elif len(rows):
-        out[rows] = convert_matrices(path, turns[rows].reshape(-1, 3, 3).transpose(0, 2, 1))
-    return out
+    """Quaternions (N, 4) of matrices (N, 9), column by column, or angles (N, 3), w first; others (N, 4) stay."""
+    if turns.shape[1] == 9:
+        return convert_matrices(path, turns.reshape(-1, 3, 3).transpose(0, 2, 1))
+    if turns.shape[1] == len(AXES):
+        with np.errstate(over="ignore", invalid="ignore"):
+            about = [rotations.exp(angle_unit * turns[:, n, None] * np.eye(3)[n]) for n in map(AXES.index, euler)]
+            return functools.reduce(rotations.multiply, about)
+    return turns
 
 
 def _read_matrices(head: TableHead, options: PoseFileOptions) -> PoseLog:

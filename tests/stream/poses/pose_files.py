@@ -189,6 +189,10 @@ SAMPLES: dict[str, str | bytes] = {
         lambda n: f"{TIMES_S[n]:.4f},{numbers(matrix(n).ravel())},normal",
         ["time," + ",".join(f"m{row}{column}" for row in range(4) for column in range(4)) + ",state"],
     ),
+    "whole matrices that count from 1": rows(
+        lambda n: f"{TIMES_S[n]:.4f},{numbers(matrix(n)[:3].ravel())},7",
+        ["time," + ",".join(f"hand.m{row}{column}" for row in range(1, 4) for column in range(1, 5)) + ",quality"],
+    ),
     "dates": rows(lambda n: f"2024-05-01T10:00:{TIMES_S[n]:06.3f}Z,{pose(n)}", ["timestamp,x,y,z,qw,qx,qy,qz"]),
     "dates without a header": rows(lambda n: f"2024-05-01 10:00:{TIMES_S[n]:06.3f},{pose(n)}"),
     "times of day over midnight": rows(
