@@ -28,7 +28,7 @@ _ROTATION = {"q", "quat", "quaternion", "orientation", "orient", "rotation", "ro
 _OTHER = {
     *("v", "vel", "velocity", "acc", "accel", "acceleration", "gyro", "omega", "angular", "linear", "twist", "bias"),
     *("cov", "covariance", "std", "sigma", "error", "imu", "mag", "marker", "markers", "residual", "euler", "scale"),
-    *("force", "torque", "variance", "raw", "target"),
+    *("force", "torque", "variance", "raw"),
 }
 _FILLERS = {
     *("field", "pose", "poses", "transform", "msg", "message", "data", "rs", "r", "rigid", "bone", "s", "world"),

@@ -111,15 +111,10 @@ def dtrack(timed: bool = True) -> str:
         return f"{numbers(1e3 * POSITIONS_M[row], ' ')}{{}}][{numbers(matrix(row)[:3, :3].T.ravel(), ' ')}]"
 
     def frame(n: int) -> str:
-        bodies = [f"[{body} 1.000][{pose_of(n).format(' 1 2 3')}" for body in range(2 - n % 2)]
-        return "\n".join(
-            [
-                f"fr {n + 1}",
-                *([f"ts {36000.0 + TIMES_S[n]:.6f}"] if timed else []),
-                *("6dcal 3", f"6d {len(bodies)} {' '.join(bodies)}"),
-                f"6df2 1 1 [0 {-1.0 if n % 5 == 3 else 1.0:.3f} 4 2][{pose_of(n).format('')}[0 0.00 0.00]",
-            ]
-        )
+        bodies = " ".join(f"[{body} 1.000][{pose_of(n).format(' 1 2 3')}" for body in range(2 - n % 2))
+        flystick = f"6df2 1 1 [0 {-1.0 if n % 5 == 3 else 1.0:.3f} 4 2][{pose_of(n).format('')}[0 0.00 0.00]"
+        clock = f"ts {36000.0 + TIMES_S[n]:.6f}\n" if timed else ""
+        return f"fr {n + 1}\n{clock}6dcal 3\n6d {2 - n % 2} {bodies}\n{flystick}"
 
     return rows(frame)
 

@@ -153,10 +153,21 @@ def test_serial_numbers_tell_bodies(tmp_path: Path) -> None:
     assert_motion(log.bodies[1])
 
 
-def test_angles_of_optitrack_are_refused(tmp_path: Path) -> None:
-    path = write(tmp_path / "take.csv", motive().replace("Rotation Type,Quaternion", "Rotation Type,XYZ"))
-    with pytest.raises(BadFile, match="rotations of the type XYZ; expected quaternions"):
+def test_angles_of_optitrack_are_read_with_their_axes(tmp_path: Path) -> None:
+    values = angles("xyz", np.pi / 180.0)
+    header = [
+        "Format Version,1.23,Take Name,T,Export Frame Rate,50,Rotation Type,XYZ,Length Units,Meters",
+        *(",," + ",".join([cell] * 7) for cell in ("Rigid Body", "target", '"7E3"')),
+        ",,Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error",
+        "Frame,Time (Seconds),X,Y,Z,X,Y,Z,",
+    ]
+    content = rows(lambda n: f"{n},{TIMES_S[n]:.4f},{numbers(values[n])},{numbers(POSITIONS_M[n])},0.001", header)
+    path = write(tmp_path / "take.csv", content)
+    with pytest.raises(BadFile, match=r"rotations of the type XYZ; expected quaternions. .* or give --euler xyz"):
         read_pose_log(path)
+    log = read_pose_log(path, PoseFileOptions(euler="xyz", up="z"))
+    assert log.names == ("target",)
+    assert_motion(log.bodies[0])
 
 
 def test_the_program_of_vicon_is_known(tmp_path: Path) -> None:
@@ -501,13 +512,6 @@ def test_a_damaged_first_row_is_no_header(tmp_path: Path) -> None:
     content = rows(line, [HEADER]).replace(line(1), "hello")
     with pytest.raises(BadFile, match="line 3: a line of 1 cells"):
         read_pose_log(write(tmp_path / "a.csv", content))
-
-
-def test_units_that_fit_as_well_are_named(tmp_path: Path) -> None:
-    content = rows(lambda n: f"{TIMES_S[n]:.4f},{pose(n, unit_m=0.0254)}", [HEADER])
-    found = finding(read_pose_log(write(tmp_path / "a.csv", content)), "length unit")
-    assert (found.value, found.assumed) == ("cm", True)
-    assert found.reason.endswith("; in would fit as well: --unit decides")
 
 
 def test_matrices_of_zeros_are_gaps(tmp_path: Path) -> None:
