@@ -16,7 +16,7 @@ _TIME = {
     *("elapsed", "datetime", "date", "clock", "utc", "zeit", "uhrzeit", "zeitstempel", "temps", "tiempo", "tempo"),
 }
 _NANOSECONDS = {"nsec", "nsecs", "nanosec", "nanoseconds"}
-_TIME_ORDER = ("measured", "stamp", "time", "timestamp", "received")
+_TIME_ORDER = ("measured", "stamp", "time", "timestamp", "received", "date")
 """Words of a time's name; a device's own time comes before the time of reception."""
 _FRAME = {"frame", "framenumber", "index", "idx", "seq", "sample", "framenum", "number"}
 _BODY = {
@@ -115,7 +115,7 @@ def parse_column_name(cells: Sequence[str]) -> ColumnName:
     if every & _OTHER:
         return ColumnName("")
     kind, axis = _LEAVES.get(leaf, ("", leaf))
-    turns = bool({*context, *upper} & _ROTATION) or leaf == "w"
+    turns = leaf == "w" or not _ROTATION.isdisjoint([*context, *(word for cell in above for word in _words(cell))])
     if not kind and turns and leaf in _IMAGINARY:
         kind, axis = "quaternion", _IMAGINARY[leaf]
     if not kind and leaf in ("x", "y", "z", "w"):

@@ -220,7 +220,7 @@ def _describe(
 def _first(names: Sequence[ColumnName], kind: str, without: Container[int] = ()) -> int | None:
     """The first column of a kind; of times the device's own."""
     found = [c for c, name in enumerate(names) if name.kind == kind and c not in without]
-    order = {"measured": 0, "stamp": 1, "received": 3}
+    order = {"measured": 0, "stamp": 1, "received": 3, "date": 4}
     return min(found, key=lambda c: (order.get(names[c].axis, 2), c), default=None)
 
 

@@ -42,6 +42,7 @@ from harness.stream.poses.column_names import ColumnName, parse_column_name
         ("hand_r21", ("matrix", "21", "hand", "")),
         ("m_0_2", ("matrix", "02", "", "")),
         ("sensor12", ("", "", "", "")),
+        ("date", ("time", "date", "", "")),
         ("Zeit [s]", ("time", "time", "", "s")),
         ("t (s)", ("time", "time", "", "s")),
         ("Timestamp (ms)", ("time", "timestamp", "", "ms")),
@@ -67,5 +68,6 @@ def test_numbers_of_components_are_a_convention() -> None:
 
 def test_cells_above_tell_body_and_kind() -> None:
     assert parse_column_name(["Rigid Body", "left hand", "Rotation", "X"]) == ColumnName("quaternion", "x", "left hand")
+    assert parse_column_name(["Head Rotation", "X"]).kind == "quaternion"
     assert parse_column_name(["Rigid Body", "hand", "Position", "X"]) == ColumnName("position", "x", "hand")
     assert parse_column_name(["Rigid Body Marker", "hand:Marker1", "Position", "X"]).kind == ""

@@ -493,6 +493,8 @@ def test_dates_are_unix_times(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", SAMPLES["dates"])
     log = read_pose_log(path)
     assert (log.clock, log.start_unix_s) == ("Unix time", 1714557600.0)
+    numbered = rows(lambda n: f"20240501,{line(n)}", [f"date,{HEADER}"])
+    assert_motion(read_pose_log(write(tmp_path / "c.csv", numbered)).bodies[0])
     nanoseconds = read_pose_log(write(tmp_path / "b.csv", SAMPLES["nanoseconds alone"]))
     assert finding(nanoseconds, "time unit").reason == "the column's name"
     with pytest.raises(BadInput, match=r"a.csv has times of day"):
