@@ -1,6 +1,7 @@
 """The verb `inspect`: describe a motion file, poses of another program, or the coverage of a constellation."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from harness.commands.flags import (
@@ -12,10 +13,12 @@ from harness.commands.flags import (
 )
 from harness.commands.output import print_result
 from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags
+from harness.core.input_file import check_input_file
 from harness.core.units import parse_length_unit
 from harness.errors import Outcome
 
 CONSTELLATION_SUFFIX = ".mcf"
+_KINDS = "a motion file, poses, or a list of emitters"
 _OF_CONSTELLATIONS = ("clip", "stations", "out", "force")
 _OF_POSES = tuple(name for name in POSE_FLAGS if name not in ("rate", "unit"))
 
@@ -54,6 +57,8 @@ def run_inspect(args: argparse.Namespace) -> Outcome:
         from harness.commands.inspect_poses import inspect_poses
 
         refuse_flags(args, (*_OF_CONSTELLATIONS, "mocap"), "with poses", "It is for other files: leave it out.")
+        for path in paths:
+            check_input_file(path, _KINDS, sys.maxsize)
         return inspect_poses(args, paths)
     args.file = first
     refuse_flags(args, _OF_POSES, f"with {first.name}", "It is for poses of another program.")

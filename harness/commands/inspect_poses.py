@@ -23,7 +23,7 @@ _HEAD = ("body", "poses", "rate [Hz]", "90 % of steps [ms]", "gaps", "longest ga
 
 def inspect_poses(args: argparse.Namespace, paths: Sequence[Path]) -> Outcome:
     """Print what one file of poses is, or several on one clock."""
-    from harness.stream import UNTIMED, measure_sampling
+    from harness.stream import FEWEST_POSES, UNTIMED, measure_sampling
 
     found = read_poses(paths, pose_options(args, untimed=True))
     log, timed = found.log, found.log.clock != UNTIMED
@@ -59,7 +59,10 @@ def inspect_poses(args: argparse.Namespace, paths: Sequence[Path]) -> Outcome:
     flags = repeat_flags(args, *POSE_FLAGS)
     following = ["characterize", *paths, *flags]
     if len(paths) > 1:
-        following = ["validate", paths[0], "--truth", paths[1], *flags]
+        few = min(one.poses for one in bodies) < FEWEST_POSES
+        following = [] if few else ["validate", paths[0], "--truth", paths[1], *flags]
+    elif max(one.poses for one in bodies) < FEWEST_POSES:
+        following = ["view", *paths, *flags]
     if not timed:
         following = ["inspect", *paths, *flags, "--rate", "HZ"]
     return print_result(args, content, *lines, following=following)

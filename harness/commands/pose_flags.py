@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from harness.stream import PoseFileOptions
     from harness.stream.recording import PoseRecording
 
-POSE_FLAGS = ("columns", "unit", "quaternion", "up", "time_unit", "rate")
+POSE_FLAGS = ("columns", "unit", "quaternion", "euler", "up", "time_unit", "rate")
 """Flags of `add_pose_flags`, as attributes of the parsed command line."""
 MARKER_SUFFIX = ".c3d"
 
@@ -23,6 +23,8 @@ def add_pose_flags(verb: argparse.ArgumentParser, *, shared: Sequence[str] = ())
     text = "names of the columns in their order, such as time,x,y,z,qx,qy,qz,qw; - for others"
     poses.add_argument("--columns", metavar="A,B", help=text)
     poses.add_argument("--quaternion", metavar="ORDER", help="order of a quaternion: xyzw or wxyz")
+    text = "axes about which angles turn, as the body then stands: zyx is yaw, pitch, roll; unit: zyx:deg or zyx:rad"
+    poses.add_argument("--euler", metavar="AXES", help=text)
     poses.add_argument("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y or -z (write --up=-y)")
     poses.add_argument("--time-unit", metavar="U", help=f"unit of times: {', '.join(TIME_UNITS_S)}")
     if "unit" not in shared:
@@ -37,7 +39,7 @@ def pose_options(args: argparse.Namespace, *, untimed: bool = False) -> "PoseFil
     from harness.stream import PoseFileOptions
 
     columns = None if args.columns is None else tuple(name.strip() for name in args.columns.split(","))
-    return PoseFileOptions(columns, args.unit, args.quaternion, args.up, args.time_unit, args.rate, untimed)
+    return PoseFileOptions(columns, args.unit, args.quaternion, args.up, args.time_unit, args.rate, untimed, args.euler)
 
 
 def holds_poses(path: Path) -> bool:

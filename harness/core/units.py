@@ -1,4 +1,4 @@
-"""Units of length and time, by the names that files and people give them."""
+"""Units of length, time and angle, by the names that files and people give them."""
 
 import math
 
@@ -6,13 +6,16 @@ from harness.errors import BadInput
 
 LENGTH_UNITS_M = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048}
 """Unit of length -> metres."""
-TIME_UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+TIME_UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "100ns": 1e-7, "ns": 1e-9}
 """Unit of time -> seconds."""
+ANGLE_UNITS_RAD = {"deg": math.pi / 180.0, "rad": 1.0}
+"""Unit of angle -> radians."""
 _WORDS = {
     **{"metre": "m", "meter": "m", "millimetre": "mm", "millimeter": "mm", "centimetre": "cm", "centimeter": "cm"},
     **{"inche": "in", "inch": "in", "feet": "ft", "foot": "ft"},
     **{"sec": "s", "second": "s", "msec": "ms", "millisecond": "ms", "usec": "us", "microsecond": "us", "µ": "us"},
-    **{"nsec": "ns", "nanosecond": "ns", "μ": "us"},
+    **{"nsec": "ns", "nanosec": "ns", "nanosecond": "ns", "μ": "us", "milli": "ms", "micro": "us", "nano": "ns"},
+    **{"degree": "deg", "°": "deg", "radian": "rad", "sekunde": "s", "sekunden": "s", "millisekunden": "ms"},
 }
 
 

@@ -24,11 +24,9 @@ from harness.measure.profile import (
 )
 from harness.measure.sampling import LOST_STEP, describe_sampling, mean_period_s
 from harness.measure.timing import TIMING_KEYS, TimingMeasurement, count_share
-from harness.stream import BodyPoses, PoseLog
+from harness.stream import FEWEST_POSES, BodyPoses, PoseLog
 from harness.stream.recording import StationReadings
 
-_FEWEST = 20
-"""Fewest poses of a body that are measured."""
 _MOST_REPEATS = 0.5
 """Share of repeats from which on they show the resolution of a body at rest, and are kept [choice]."""
 _NO_REST = "No body rests for 5 s."
@@ -48,9 +46,9 @@ def measure_log_profile(
     BadInput for bodies of `bar` that are not in it, and without a body of 20 poses.
     """
     require_pair(bar, log.names)
-    bodies = [body for body in log.bodies if len(body.times_s) >= _FEWEST]
+    bodies = [body for body in log.bodies if len(body.times_s) >= FEWEST_POSES]
     if not bodies:
-        raise BadInput(f"{log.source} has no body with {_FEWEST} poses.", "Record for longer.")
+        raise BadInput(f"{log.source} has no body with {FEWEST_POSES} poses.", "Record for longer.")
     repeats = {body.name: find_repeats(body) for body in bodies}
     kept = {name: ~same if same.mean() < _MOST_REPEATS else np.ones(len(same), bool) for name, same in repeats.items()}
     series = {body.name: even_series(body, kept[body.name]) for body in bodies}
@@ -63,7 +61,7 @@ def measure_log_profile(
     if bar:
         collected.add_motion({body.name: _raw(body, kept[body.name]) for body in bodies})
     unseen = [body.name for body in log.bodies if body not in bodies]
-    notes = [f"{name}: fewer than {_FEWEST} poses, not measured." for name in unseen]
+    notes = [f"{name}: fewer than {FEWEST_POSES} poses, not measured." for name in unseen]
     for body in bodies:
         notes += _describe(body, kept[body.name], series[body.name], counted)
     noise, episodes = _fit(collected, notes, progress)

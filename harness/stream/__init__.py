@@ -11,15 +11,16 @@ if TYPE_CHECKING:
     from harness.stream.line_events import EventCounter, LineEvent
     from harness.stream.ports import TrackerConfig, open_tracker_at
     from harness.stream.poses.options import PoseFileOptions
-    from harness.stream.poses.pose_file import UNTIMED
+    from harness.stream.poses.pose_conversion import UNTIMED
     from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
-    from harness.stream.poses.pose_statistics import measure_sampling
+    from harness.stream.poses.pose_statistics import FEWEST_POSES, measure_sampling
     from harness.stream.station_counts import FRAME_COLUMNS, StationCounts, StreamSummary, format_csv_row, frame_rows
     from harness.stream.tracker import OpenTracker
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
 __all__ = [
+    "FEWEST_POSES",
     "FRAME_COLUMNS",
     "INPUT_COMBINATIONS",
     "UNTIMED",

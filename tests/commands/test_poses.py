@@ -13,7 +13,19 @@ from harness.study.trust.plan import plan_digest
 from tests.command import Command
 from tests.mocap.c3d_bytes import c3d_bytes
 from tests.report.reading import text_of
-from tests.stream.poses.pose_files import COUNT, SAMPLES, TIMES_S, UNTIMED, motive, pose, tum, write
+from tests.stream.poses.pose_files import (
+    COUNT,
+    SAMPLES,
+    TIMES_S,
+    UNTIMED,
+    angles,
+    motive,
+    numbers,
+    pose,
+    rows,
+    tum,
+    write,
+)
 from tests.verb_examples import unpack_files
 
 
@@ -66,10 +78,31 @@ def test_inspect_of_a_file_without_times_asks_for_its_rate(folder: Path, command
 
 def test_a_single_pose_and_a_header_alone(folder: Path, command: Command) -> None:
     write(folder / "one.csv", f"t,x,y,z,qw,qx,qy,qz\n0.5,{pose(0)}\n")
-    assert command("inspect", "one.csv").lines[0].startswith("one.csv: 1 pose of 1 body, ")
+    shown = command("inspect", "one.csv")
+    assert shown.lines[0].startswith("one.csv: 1 pose of 1 body, ")
+    assert shown.line("next: ") == "harness view one.csv"
+    command("view", "one.csv", "--out", "one.html")
     write(folder / "header.csv", "t,x,y,z,qw,qx,qy,qz\n")
     assert "What other poses lack, `harness inspect` says" in command("view", "header.csv", code=2).err
     assert "no rows of numbers" in command("inspect", "header.csv", code=2).err
+
+
+@pytest.mark.parametrize(("count", "verb"), [(19, "view"), (20, "characterize")])
+def test_inspect_names_a_verb_that_takes_so_few_poses(count: int, verb: str, folder: Path, command: Command) -> None:
+    write(folder / "few.csv", rows(lambda n: f"{TIMES_S[n]:.4f},{pose(n)}", ["t,x,y,z,qw,qx,qy,qz"], count))
+    assert command("inspect", "few.csv").line("next: ") == f"harness {verb} few.csv"
+    command("characterize", "few.csv", code=0 if verb == "characterize" else 2)
+    shown = command("inspect", "few.csv", "plain.csv")
+    assert ("next: harness validate" in shown.out + shown.err) == (verb == "characterize")
+
+
+def test_inspect_takes_angles_and_the_next_command_too(folder: Path, command: Command) -> None:
+    values = angles("zyx", np.pi / 180.0)[:, ::-1]
+    write(folder / "fastrak.txt", rows(lambda n: f"{TIMES_S[n]:.4f} 1 2 3 {numbers(values[n], ' ')}"))
+    words = ["fastrak.txt", "--columns", "t,x,y,z,yaw,pitch,roll", "--euler", "zyx"]
+    shown = command("inspect", *words)
+    assert "axes of the angles: zyx (given by --euler)" in shown.lines
+    assert shown.line("next: ") == shlex.join(["harness", "characterize", *words])
 
 
 def test_inspect_reads_several_files_on_one_clock(folder: Path, command: Command) -> None:
@@ -170,6 +203,11 @@ def write_markers(folder: Path) -> Path:
         ("calibrate rig.rec --out a.toml", "a recording of poses; expected a recording of a device's line."),
         ("inspect plain.csv --quaternion zyxw", "--quaternion 'zyxw'. Choose one of xyzw, wxyz."),
         ("inspect plain.csv --unit furlong", "Unit 'furlong'. Name one of m, mm, cm, in, ft"),
+        ("inspect none.csv", "none.csv: no such file; expected a motion file, poses, or a list of emitters. Check the"),
+        ("inspect plain.csv none.csv", "none.csv: no such file; expected a motion file"),
+        ("inspect plain.csv --euler zyx", "--euler, but plain.csv has no angles alone. Leave it out."),
+        ("inspect plain.csv --euler zz", "--euler 'zz'. Choose one of xyz, xzy, yxz, yzx, zxy, zyx."),
+        ("inspect plain.csv --euler zyx:turns", "Unit of --euler 'turns'. Choose one of deg, rad."),
         ("inspect plain.csv --clip walking_p1_01", "--clip with poses."),
         ("inspect walking.bvh --columns a,b", "--columns with walking.bvh. It is for poses of another program."),
     ],

@@ -343,10 +343,15 @@ KINDS: dict[str, Kind] = {
         Kind("method options", _write("x.txt", OPTIONS), ("*",), TEXT, _read_options),
         Kind("calibration", _make_calibration, ("*",), TOML, _read_calibration, mend=mend_calibration),
         Kind("recording", _make_recording, ("*",), RECORDING, _read_recording, "replay {}/x.rec --frames"),
-        *(_pose_kind(name, pose_files.SAMPLES[name]) for name in ("tum", "euroc", "no names", "tabs", "quotes")),
+        *(
+            _pose_kind(name, pose_files.SAMPLES[name])
+            for name in ("tum", "euroc", "no names", "tabs", "quotes", "dates")
+        ),
         *(_pose_kind(name, pose_files.UNTIMED[name]) for name in ("matrices", "kitti")),
         _pose_kind("of optitrack", pose_files.motive(range(5))),
         _pose_kind("of vicon", pose_files.vicon_tracker()),
+        _pose_kind("of qualisys", pose_files.qualisys(range(5))),
+        _pose_kind("of dtrack", pose_files.dtrack()),
         Kind("pose recording", _make_pose_recording, ("*",), RECORDING, _read_poses("x.rec"), "inspect {}/x.rec"),
         Kind("cell", _make_run, ("x/cells/*/cell.json",), JSON, _read_run, _COMPARE, mend_run),
         Kind("frames of a cell", _make_run, ("x/cells/*/frames.npz",), NPZ, _read_run, _COMPARE, mend_run),

@@ -1,42 +1,34 @@
-"""Which columns of a table are time, position and quaternion of which body."""
+"""Which columns of a table are time, position and rotation of which body."""
 
 import re
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
-from harness.core.units import LENGTH_UNITS_M, TIME_UNITS_S, find_unit
+from harness.core.arrays import Floats
+from harness.core.units import ANGLE_UNITS_RAD, LENGTH_UNITS_M, TIME_UNITS_S, find_unit
 from harness.errors import BadFile
-from harness.stream.poses.column_names import AXES, ColumnName, parse_column_name
+from harness.stream.poses.column_groups import COLUMNS_ADVICE, EXPECTED_COLUMNS, QUATERNION, BodyColumns, group_columns
+from harness.stream.poses.column_names import ColumnName, parse_column_name
 from harness.stream.poses.number_table import TableHead
 from harness.stream.poses.pose_log import FileFinding
 
-EXPECTED_COLUMNS = "columns of a time, a position and a quaternion"
 NORM_TOLERANCE = 0.01
 """Largest deviation of a quaternion's norm from 1."""
-_ADVICE = "Name the columns in their order, - for others: --columns time,x,y,z,qx,qy,qz,qw."
 _LABELS = {"id", "parent", "asset id"}
 """First words of header lines that name neither bodies nor columns."""
-_IDENTIFIER = re.compile(r"[0-9a-f]{8,32}")
+_IDENTIFIER = re.compile(r"(?=[a-f]*\d)[0-9a-f]+")
 """An identifier of OptiTrack's program, in lower case."""
-_QUATERNION = ("w", "x", "y", "z")
-_RATES = ("export frame rate", "capture frame rate", "objects", "segments")
-"""Names of the rate in the headers of OptiTrack's and Vicon's programs."""
-
-
-@dataclass(frozen=True)
-class BodyColumns:
-    """Columns of one body, from 0."""
-
-    name: str
-    """"" where the file does not name it."""
-    position: tuple[int, ...]
-    """(3,) x, y, z."""
-    quaternion: tuple[int, ...]
-    """(4,) components in the order in which they stand in the file."""
+_RATES = ("export frame rate", "capture frame rate", "frequency", "objects", "segments")
+"""Names of the rate in the headers of OptiTrack's, Qualisys' and Vicon's programs."""
+_PROGRAMS = {"take name": "OptiTrack", "rotation type": "OptiTrack", "body_names": "Qualisys", "dtrack": "DTrack"}
+"""Name in the header -> what writes it."""
+MILLIMETRE_PROGRAMS = ("Qualisys", "DTrack")
+"""Programs that write lengths in mm, without a word about it."""
+_MOST_NAMED = 8
+"""Most columns that are named one by one as not read."""
 
 
 @dataclass(frozen=True)
@@ -54,41 +46,51 @@ class TableColumns:
     text_time: str = ""
     """Name of a column of times that are written as text; "" if there is none."""
     time_unit: str = ""
-    """Unit that the header states; "" if none."""
+    """Unit that the header states, that of dates and times of day; "" if none."""
+    dated: bool = False
+    """Whether `time` holds dates or times of day, which are read in seconds."""
     length_unit: str = ""
     rate_hz: float | None = None
     """Rate that the header states [Hz]."""
     order: str = ""
     """Order of a quaternion's components in the file, such as "xyzw"; "" where no names tell it."""
     order_reason: str = ""
-    motive: bool = False
-    """Whether OptiTrack's program wrote the file."""
+    angle_unit: str = ""
+    """Unit of angles that the header states; "" if none."""
+    program: str = ""
+    """What wrote the file: `OptiTrack`, `Qualisys` or `DTrack`; "" for others."""
     findings: tuple[FileFinding, ...] = ()
 
 
-def find_columns(head: TableHead, names: Sequence[str] | None = None) -> TableColumns:
-    """Conclude the meaning of the columns from `names`, the header, or the numbers. Raises BadFile."""
+def find_columns(head: TableHead, names: Sequence[str] | None = None, *, angles: bool = False) -> TableColumns:
+    """Conclude the meaning of the columns from `names`, the header, or the numbers. Raises BadFile.
+
+    With `angles` a body may have angles in place of a quaternion or matrix.
+    """
     if names is not None:
         if len(names) > head.columns:
             found = f"{head.columns} columns, where --columns names {len(names)}"
-            raise BadFile(head.path, found, "no more names than columns", _ADVICE)
+            raise BadFile(head.path, found, "no more names than columns", COLUMNS_ADVICE)
         paths = [(name,) for name in (*names, *["-"] * (head.columns - len(names)))]
-        return _from_names(head, paths, "given by --columns", {})
+        return _from_names(head, paths, "given by --columns", {}, angles=angles)
     facts = _facts(head.header)
-    if facts.get("rotation type", "quaternion").lower() != "quaternion":
+    if facts.get("rotation type", "quaternion").lower() != "quaternion" and not angles:
         found = f"rotations of the type {facts['rotation type']}"
-        raise BadFile(head.path, found, "quaternions", "Export with the rotation type Quaternion.")
+        advice = f"Export with the rotation type Quaternion, or give --euler {facts['rotation type'].lower()}."
+        raise BadFile(head.path, found, "quaternions", advice)
     rows = [row for row in (_fit(row, head.columns) for row in head.header) if row]
     scores = [sum(parse_column_name([cell]).kind not in ("", "body") for cell in row) for row in rows]
     best = max(range(len(rows)), key=lambda n: (scores[n], n), default=None)
     own = [] if best is None else [parse_column_name([cell]) for cell in rows[best]]
-    turn = {name.axis for name in own if name.kind == "quaternion"} == set(_QUATERNION)
+    turn = {name.axis for name in own if name.kind == "quaternion"} == set(QUATERNION)
     if best is None or (scores[best] < min(6, head.columns) and not turn):
         return _from_numbers(head)
-    above = [_spread(row) for row in rows[:best] if _is_context(row)]
-    cells = [(*(row[c] for row in above), rows[best][c]) for c in range(head.columns)]
+    above = [_spread(row) for row in _context(rows[:best], _program(facts))]
+    cells: list[tuple[str, ...]] = [(*(row[c] for row in above), rows[best][c]) for c in range(head.columns)]
+    if _program(facts) == "Qualisys":
+        cells = _name_bodies(rows[best])
     units = rows[best + 1] if best + 1 < len(rows) else ("",) * head.columns
-    return _from_names(head, cells, "the header's names", facts, units)
+    return _from_names(head, cells, "the header's names", facts, units, angles=angles)
 
 
 def _fit(row: Sequence[str], columns: int) -> tuple[str, ...]:
@@ -102,10 +104,28 @@ def _fit(row: Sequence[str], columns: int) -> tuple[str, ...]:
     return (*cells, *[""] * (columns - len(cells)))
 
 
-def _is_context(row: Sequence[str]) -> bool:
-    """Whether a header line may name bodies or the kind of the columns below: nothing stands over the first one."""
-    label = next((cell.lower() for cell in row if cell), "")
-    return bool(label) and not row[0] and label not in _LABELS and not _IDENTIFIER.fullmatch(label)
+def _program(facts: Mapping[str, str]) -> str:
+    return next((program for name, program in _PROGRAMS.items() if name in facts), "")
+
+
+def _context(rows: Sequence[tuple[str, ...]], program: str) -> list[tuple[str, ...]]:
+    """The header lines that may name bodies or the kind of the columns below: nothing stands over the first one."""
+    labels = [next((cell.lower() for cell in row if cell), "") for row in rows]
+    kept = [row for row, label in zip(rows, labels, strict=True) if label and not row[0] and label not in _LABELS]
+    identifiers = [row for row in kept if all(_IDENTIFIER.fullmatch(cell.lower()) for cell in row if cell)]
+    if program == "OptiTrack" and identifiers:
+        kept.remove(identifiers[-1])  # a line before it may hold names of that form
+    return kept
+
+
+def _name_bodies(row: Sequence[str]) -> list[tuple[str, ...]]:
+    """The cells of Qualisys' header, in which X alone has the name of the body before it, with the name above."""
+    out, body = list[tuple[str, ...]](), ""
+    for cell in row:
+        name, _, last = cell.rpartition(" ")
+        body, own = (name, last) if last == "X" else (body, cell)
+        out.append((body, own))
+    return out
 
 
 def _spread(row: Sequence[str]) -> list[str]:
@@ -125,95 +145,82 @@ def _facts(header: Sequence[Sequence[str]]) -> dict[str, str]:
     return {name.lower(): value for name, value in pairs if name and value}
 
 
-@dataclass
-class _Group:
-    """Columns of one body while they are collected."""
-
-    name: str
-    family: str
-    columns: dict[str, int] = field(default_factory=dict)
-
-
 def _from_names(
     head: TableHead,
     paths: Sequence[Sequence[str]],
     source: str,
     facts: Mapping[str, str],
     units: Sequence[str] = (),
+    *,
+    angles: bool,
 ) -> TableColumns:
     names = [parse_column_name(path) if path[-1] != "-" else ColumnName("") for path in paths]
-    groups: dict[str, list[_Group]] = {"position": [], "quaternion": []}
-    for c, name in enumerate(names):
-        if name.kind in groups and c not in head.text_columns:
-            same = [group for group in groups[name.kind] if (group.name, group.family) == (name.body, name.family)]
-            free = next((group for group in same if name.axis not in group.columns), None)
-            if free is None:
-                groups[name.kind].append(free := _Group(name.body, name.family))
-            free.columns[name.axis] = c
-    places = [group for group in groups["position"] if set(group.columns) == set(AXES)]
-    turns = [group for group in groups["quaternion"] if set(group.columns) == set(_QUATERNION)]
-    bodies = _pair(places, turns)
-    if not bodies:
-        raise _missing(head.path, names, paths, bool(places), bool(turns))
-    chosen = [c for body in bodies for c in (*body.position, *body.quaternion)]
+    bodies = group_columns(head.path, names, paths, head.text_columns, angles=angles)
+    chosen = [c for body in bodies for c in (*body.position, *body.rotation, *body.valid)]
     time, frame = _first(names, "time", head.text_columns), _first(names, "frame", head.text_columns)
-    numbered = any(names[c].numbered for c in chosen)
+    nanoseconds = _first(names, "nanoseconds", head.text_columns)
+    time_unit = "" if time is None else names[time].unit or _unit_of(units, time, TIME_UNITS_S)
+    if time is None and nanoseconds is not None:
+        time, nanoseconds, time_unit = nanoseconds, None, "ns"
+    dated = time in head.word_columns
+    body_column = _first(names, "body") if len(bodies) == 1 else None
+    program = _program(facts)
     lengths = {names[c].unit or _unit_of(units, c, LENGTH_UNITS_M) for body in bodies for c in body.position}
     lengths.add(next((find_unit(facts[key], LENGTH_UNITS_M) for key in ("length units", "units") if key in facts), ""))
+    lengths.add("mm" if program in MILLIMETRE_PROGRAMS else "")
     rate = next((facts[key] for key in _RATES if key in facts), "")
-    text = ", ".join("/".join(filter(None, paths[c])) for c in sorted(chosen[:7]))
-    text = text if time is None else f"{paths[time][-1]}, {text}"
+    used = {*chosen, time, nanoseconds, body_column, frame}
     return TableColumns(
         bodies,
         time,
         frame,
-        _first(names, "body") if len(bodies) == 1 else None,
-        None if time is None else _first(names, "nanoseconds", head.text_columns),
-        next((paths[c][-1] for c in sorted(head.text_columns) if names[c].kind == "time"), ""),
-        "" if time is None else names[time].unit or _unit_of(units, time, TIME_UNITS_S),
-        max(lengths),
-        float(rate) if re.fullmatch(r"\d+(\.\d+)?", rate) and float(rate) > 0.0 else None,
-        "".join(names[c].axis for c in bodies[0].quaternion),
-        "q0 is the real part in most programs" if numbered else source,
-        "format version" in facts and "take name" in facts,
-        (FileFinding("columns", text + (", ..." if len(bodies) > 1 else ""), source),),
+        body_column,
+        nanoseconds,
+        text_time=next((paths[c][-1] for c in sorted(head.text_columns) if names[c].kind == "time"), ""),
+        time_unit="s" if dated else time_unit,
+        dated=dated,
+        length_unit=max(lengths),
+        rate_hz=float(rate) if re.fullmatch(r"\d+(\.\d+)?", rate) and float(rate) > 0.0 else None,
+        order="".join(names[c].axis for c in bodies[0].rotation) if len(bodies[0].rotation) == 4 else "",
+        order_reason="q0 is the real part in most programs" if any(names[c].numbered for c in chosen) else source,
+        angle_unit=max(names[c].unit or _unit_of(units, c, ANGLE_UNITS_RAD) for c in bodies[0].rotation),
+        program=program,
+        findings=_describe(bodies, names, paths, source, time, used),
     )
 
 
-def _pair(places: Sequence[_Group], turns: Sequence[_Group]) -> tuple[BodyColumns, ...]:
-    """Positions and quaternions of the same body; those of the only body may have different names."""
-    pairs = [(place, turn) for place, turn in zip(places, turns, strict=False) if place.name == turn.name]
-    if len(places) == len(turns) == 1:
-        pairs = [(places[0], turns[0])]
-    elif len(pairs) < max(len(places), len(turns)):
-        by_name = {turn.name: turn for turn in turns}
-        pairs = [(place, by_name[place.name]) for place in places if place.name in by_name]
-    return tuple(
-        BodyColumns(
-            place.name or turn.name,
-            tuple(place.columns[axis] for axis in AXES),
-            tuple(sorted(turn.columns.values())),
-        )
-        for place, turn in pairs
-    )
-
-
-def _missing(
-    path: Path, names: Sequence[ColumnName], paths: Sequence[Sequence[str]], has_place: bool, has_turn: bool
-) -> BadFile:
-    angles = [p[-1] for name, p in zip(names, paths, strict=True) if name.kind == "angle" or name.family == "r"]
-    if has_place and not has_turn and angles:
-        found = f"angles ({', '.join(angles[:6])}) of a convention that the file does not name"
-        return BadFile(path, found, "quaternions or matrices", "Export quaternions.")
-    lacks = "position" if not has_place else "quaternion" if not has_turn else "body with both of them"
-    shown = ", ".join("/".join(filter(None, path)) for path in paths[:12])
-    return BadFile(path, f"no {lacks} among the columns {shown}", EXPECTED_COLUMNS, _ADVICE)
+def _describe(
+    bodies: Sequence[BodyColumns],
+    names: Sequence[ColumnName],
+    paths: Sequence[Sequence[str]],
+    source: str,
+    time: int | None,
+    used: Container[int | None],
+) -> tuple[FileFinding, ...]:
+    """What the columns of the first body are, and which columns nothing uses."""
+    shown, first = ["/".join(filter(None, path)) for path in paths], bodies[0]
+    text = [
+        *([] if time is None else [paths[time][-1]]),
+        *(shown[c] for c in sorted((*first.position, *first.rotation))),
+    ]
+    findings = [FileFinding("columns", ", ".join([*text, *["..."] * (len(bodies) > 1)]), source)]
+    if len(first.rotation) == 9:
+        by_number = len(names[first.rotation[0]].axis) == 1
+        reason = "the order of Qualisys and DTrack" if by_number else "the names count rows and columns"
+        findings.append(FileFinding("rotation", "matrix" + ", column by column" * by_number, reason))
+    named = [c for c, path in enumerate(paths) if c not in used and path[-1] not in ("", "-")]
+    if rest := list(dict.fromkeys(shown[c] for c in named)):
+        more = f" and {len(rest) - _MOST_NAMED} others" if len(rest) > _MOST_NAMED else ""
+        unknown = any(names[c].kind == "valid" for c in named)
+        reason = "not needed for times and poses" + ", or words of unknown meaning" * unknown
+        findings.append(FileFinding("not read", ", ".join(rest[:_MOST_NAMED]) + more, reason))
+    return tuple(findings)
 
 
 def _first(names: Sequence[ColumnName], kind: str, without: Container[int] = ()) -> int | None:
     """The first column of a kind; of times the device's own."""
     found = [c for c, name in enumerate(names) if name.kind == kind and c not in without]
-    order = {"measured": 0, "stamp": 1, "received": 3}
+    order = {"measured": 0, "stamp": 1, "received": 3, "date": 4}
     return min(found, key=lambda c: (order.get(names[c].axis, 2), c), default=None)
 
 
@@ -233,24 +240,31 @@ def _from_numbers(head: TableHead) -> TableColumns:
                 found = tuple(BodyColumns("", tuple(s[position]), tuple(s[quaternion])) for s in starts)
                 return _without_names(head, number[:before], found)
     what = f"no four columns of norm 1 where a quaternion may stand, in {head.form}"
+    if lead <= 2 and len(norms := _norms(head, last := number[lead + 3 : lead + 7])):
+        what += f"; columns {last[0] + 1} to {last[-1] + 1} have the norm {np.median(norms):.4g}"
     if len(number) < 7:
         what = f"rows of {len(number)} numbers, where a pose has 7, or 12 in a matrix"
-    raise BadFile(head.path, what, EXPECTED_COLUMNS, _ADVICE)
+    raise BadFile(head.path, what, EXPECTED_COLUMNS, COLUMNS_ADVICE)
 
 
 def _has_norm_1(head: TableHead, columns: Sequence[int]) -> bool:
     """Whether columns hold quaternions, in nearly all rows that have numbers there."""
-    with np.errstate(over="ignore"):
-        norms = np.sqrt(np.sum(head.rows[:, columns] ** 2, axis=1))
-    norms = norms[np.isfinite(norms) & (norms > 0.0)]
+    norms = _norms(head, columns)
     return len(norms) > 0 and float(np.mean(np.abs(norms - 1.0) < NORM_TOLERANCE)) > 0.95
+
+
+def _norms(head: TableHead, columns: Sequence[int]) -> Floats:
+    """Those of the rows that have numbers there, and not zeros alone."""
+    with np.errstate(over="ignore"):
+        norms: Floats = np.sqrt(np.sum(head.rows[:, columns] ** 2, axis=1))
+    return norms[np.isfinite(norms) & (norms > 0.0)]
 
 
 def _without_names(head: TableHead, before: Sequence[int], bodies: tuple[BodyColumns, ...]) -> TableColumns:
     body = min(head.text_columns, default=None) if len(bodies) == 1 else None
     if len(before) == 2 and body is None and len(np.unique(head.rows[:, before[1]])) <= max(len(head.rows) // 10, 1):
         body = before[1]  # the number of a body: it has few values
-    place, turn = bodies[0].position, bodies[0].quaternion
+    place, turn = bodies[0].position, bodies[0].rotation
     parts = [
         *([f"time {before[0] + 1}"] if before else []),
         f"position {place[0] + 1} to {place[-1] + 1}",
@@ -259,4 +273,7 @@ def _without_names(head: TableHead, before: Sequence[int], bodies: tuple[BodyCol
         *([f"body {body + 1}"] if body is not None else []),
     ]
     finding = FileFinding("columns", ", ".join(parts), "no header; a quaternion's columns have the norm 1")
-    return TableColumns(bodies, before[0] if before else None, None, body, findings=(finding,))
+    time = before[0] if before else None
+    dated = time in head.word_columns
+    unit = "s" if dated else ""
+    return TableColumns(bodies, time, None, body, time_unit=unit, dated=dated, findings=(finding,))

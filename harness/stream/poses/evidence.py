@@ -11,6 +11,8 @@ from harness.stream.poses.pose_log import FileFinding
 
 UNIX_S = (6.3e8, 4.1e9)
 """Range of Unix times that are taken for such: 1990 to 2099 [s] [choice]."""
+_TICK, _TICKS = "100ns", (6.3e17, 6.8e17)
+"""Unit of the ticks of .NET since the year 1, and their range from 1997 to 2155: as Unix times in ns, 1989 to 1991."""
 _STEP_S = (2e-4, 10.0)
 """Range of steps between Unix times of which the unit is believed [s]."""
 _USUAL_RATE_HZ = 60.0
@@ -18,6 +20,9 @@ _ROOM, _VEHICLE = 20.0, 200.0
 """Largest coordinate in a room [m], and above which a file in metres is one of a vehicle [choices]."""
 _FASTEST = 20.0
 """Speed that a body, and hardly a vehicle, stays below [m/s] [choice]."""
+_USUAL_M = (0.3, 12.0)
+"""Largest coordinates that are usual [m]: units with which a file has such are named as alternatives [choice]."""
+_FULL_TURN = 6.3
 _COARSE_STEPS = 0.1
 """Resolution of times, in median steps, from which on it is told [choice]."""
 _LAG_S = 0.3
@@ -41,13 +46,16 @@ def conclude_time_unit(times: Floats, stated: str, given: str | None) -> FileFin
     steps = np.diff(times)
     steps = steps[steps > 0.0]
     step = float(np.median(steps)) if len(steps) else 0.0
+    if _TICKS[0] <= times[0] <= _TICKS[1]:
+        return FileFinding("time unit", _TICK, "the first time is one of .NET, counted from the year 1")
     for name, unit_s in TIME_UNITS_S.items():
         if UNIX_S[0] <= times[0] * unit_s <= UNIX_S[1] and (not step or _STEP_S[0] <= step * unit_s <= _STEP_S[1]):
             day = datetime.fromtimestamp(float(times[0] * unit_s), UTC).date()
             return FileFinding("time unit", name, f"the first time is a Unix time of {day}")
     if not step:
         return FileFinding("time unit", "s", "there is one time only", assumed=True)
-    name = min(TIME_UNITS_S, key=lambda each: abs(np.log(step * TIME_UNITS_S[each] * _USUAL_RATE_HZ)))
+    usual = [each for each in TIME_UNITS_S if each != _TICK]
+    name = min(usual, key=lambda each: abs(np.log(step * TIME_UNITS_S[each] * _USUAL_RATE_HZ)))
     step_s = step * TIME_UNITS_S[name]
     doubtful = not 1e-3 <= step_s <= 0.4
     return FileFinding("time unit", name, f"the median step of {step:.6g} is then {1e3 * step_s:.4g} ms", doubtful)
@@ -78,13 +86,21 @@ def conclude_resolution(times: Floats, scale_s: float) -> FileFinding | None:
 
 
 def conclude_length_unit(
-    positions: Floats, times_s: Floats | None, stated: str, given_m: float | None
+    positions: Floats,
+    times_s: Floats | None,
+    stated: str,
+    given_m: float | None,
+    *,
+    reason: str = "the file's header",
 ) -> tuple[FileFinding, float]:
-    """The unit of raw positions (N, 3) of one body, and its length [m]; times are None where a file has none."""
+    """The unit of raw positions (N, 3) of one body, and its length [m]; times are None where a file has none.
+
+    `reason` is why a `stated` unit counts.
+    """
     if given_m is not None:
         return FileFinding("length unit", f"{given_m:g} m", "given by --unit"), given_m
     if stated:
-        return FileFinding("length unit", stated, "the file's header"), LENGTH_UNITS_M[stated]
+        return FileFinding("length unit", stated, reason), LENGTH_UNITS_M[stated]
     size = float(np.percentile(np.abs(positions).max(axis=1), 95))
     speed = _speed(positions, times_s)
     shown = f"coordinates reach {size:.4g}" + (f" and speeds {speed:.4g} a second" if speed else "")
@@ -97,7 +113,25 @@ def conclude_length_unit(
         name = "m" if speed <= 2.0 * _FASTEST and spread > _VEHICLE else "mm"
         doubtful = speed <= 2.0 * _FASTEST
         name = name if times_s is not None else "mm"
-    return FileFinding("length unit", name, shown, doubtful), LENGTH_UNITS_M[name]
+    others = [
+        unit
+        for unit, unit_m in LENGTH_UNITS_M.items()
+        if unit not in (name, "ft") and _USUAL_M[0] <= size * unit_m <= _USUAL_M[1] and speed * unit_m <= _FASTEST
+    ]
+    if others:
+        shown += f"; {' or '.join(others)} would fit as well: --unit decides"
+    return FileFinding("length unit", name, shown, doubtful or bool(others)), LENGTH_UNITS_M[name]
+
+
+def conclude_angle_unit(angles: Floats, stated: str, given: str) -> FileFinding:
+    """The unit of angles, an array of any shape; `stated` is that of the columns' names, `given` that of an option."""
+    if given or stated:
+        return FileFinding("unit of angles", given or stated, "given by --euler" if given else "the columns' names")
+    largest = float(np.nanmax(np.abs(angles), initial=0.0))
+    if largest > _FULL_TURN:
+        return FileFinding("unit of angles", "deg", f"they reach {largest:.4g}")
+    doubt = f"they reach {largest:.4g}, less than a turn in radians; with degrees write :deg behind the axes"
+    return FileFinding("unit of angles", "rad", doubt, assumed=True)
 
 
 def _speed(positions: Floats, times_s: Floats | None) -> float:

@@ -1,5 +1,7 @@
 """Poses as matrices: 4x4 or 3x4, a row a line, or all numbers of a matrix in a line (KITTI), with or without a time."""
 
+from pathlib import Path
+
 import numpy as np
 
 from harness.core import rotations
@@ -42,12 +44,23 @@ def split_matrices(head: TableHead, numbers: Floats) -> tuple[Floats | None, Flo
             raise BadFile(head.path, f"matrix {at + 1} does not end with 0 0 0 1", "4x4 matrices", "Is a line missing?")
     else:
         times, matrices = _in_lines(numbers)
-    deviation = _deviation(matrices)
-    if not (deviation < _MOST_DEVIATION).all():
-        at = int(np.flatnonzero(~(deviation < _MOST_DEVIATION))[0])
-        found = f"matrix {at + 1} whose axes are not of length 1 and right angles, or that mirrors"
-        raise BadFile(head.path, found, "rotation matrices", "Is it the right file?")
-    return times, matrices[:, :, 3], rotations.from_matrix(rotations.nearest_rotation(matrices[:, :, :3])), left_out
+    return times, matrices[:, :, 3], convert_matrices(head.path, matrices[:, :, :3]), left_out
+
+
+def convert_matrices(path: Path, matrices: Floats) -> Floats:
+    """Quaternions (N, 4) w, x, y, z of matrices (N, 3, 3); zeros for matrices of zeros or that miss numbers.
+
+    Raises BadFile for other matrices that are no rotations.
+    """
+    present = np.isfinite(matrices).all(axis=(1, 2)) & matrices.any(axis=(1, 2))
+    wrong = np.flatnonzero(present & ~(_deviation(matrices) < _MOST_DEVIATION))
+    if len(wrong):
+        found = f"matrix {wrong[0] + 1} whose axes are not of length 1 and right angles, or that mirrors"
+        raise BadFile(path, found, "rotation matrices", "Is it the right file?")
+    out = np.zeros((len(matrices), 4))
+    if present.any():
+        out[present] = rotations.from_matrix(rotations.nearest_rotation(matrices[present]))
+    return out
 
 
 def _rows_of_matrix(rows: Floats) -> int:
@@ -68,7 +81,7 @@ def _in_lines(rows: Floats) -> tuple[Floats | None, Floats]:
 
 
 def _deviation(matrices: Floats) -> Floats:
-    """(N,) largest deviation of the left part of matrices (N, 3, 4) from a proper rotation; inf for a mirroring one."""
+    """(N,) largest deviation of the left part of matrices (N, 3, 3 or 4) from a proper rotation; inf for a mirror."""
     turns = matrices[:, :, :3]
     with np.errstate(over="ignore", invalid="ignore"):
         products = np.abs(np.einsum("nki,nkj->nij", turns, turns) - np.eye(3)).max(axis=(1, 2))

@@ -8,7 +8,7 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,8 @@ from harness.core.csv_text import unescape_formula
 from harness.core.file_kind import file_kind, wrong_file
 from harness.core.input_file import MEGABYTE, open_input_file
 from harness.errors import BadFile, Outcome
+from harness.stream.poses.clock_text import parse_clock
+from harness.stream.poses.dtrack_text import DTrackText
 
 EXPECTED_FILE = "timed poses in rows of numbers (TUM, EuRoC, CSV, matrices)"
 MAX_BYTES = 2048 * MEGABYTE
@@ -28,9 +30,19 @@ _HEAD_CHARACTERS = MEGABYTE
 _PIECE_CHARACTERS = 4 * MEGABYTE
 _LONGEST_LINE = 8 * MEGABYTE
 _MOST_NAMES = 1000
+_MOST_ABOVE = 2
+"""Most header lines that hold numbers alone, as those of OptiTrack with identifiers; nothing stands in their first
+cell."""
 _COMMENT = re.compile(r"\s*(#|%|//)+")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,9})?")
-_MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
+_WORDS = {
+    **dict.fromkeys(("", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"), np.nan),
+    **{"true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0, "wahr": 1.0, "falsch": 0.0},
+}
+"""Words in columns of numbers -> what they stand for."""
+_NUMBER_WORD = re.compile(r'[ "]*(true|false|yes|no|wahr|falsch|[\d/-]*[T_ ]?\d+:\d\d:)', re.IGNORECASE)
+_MARKUP = {"JSON": re.compile(r'\s*(\{|\[\s*[\[{"])'), "XML": re.compile(r"\s*<[?!\w]")}
+"""Text that is no table -> how it begins."""
 _FORMS = ((",", "."), (";", "."), ("\t", "."), (None, "."), (";", ","), ("\t", ","), (None, ","))
 """Separators (None: blanks) and decimal signs; the first of equally good ones counts."""
 _SEPARATOR_NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
@@ -51,6 +63,8 @@ class TableHead:
     columns: int
     text_columns: frozenset[int]
     """Columns, from 0, that hold words."""
+    word_columns: frozenset[int]
+    """Columns of numbers that are written as words: true and false, dates and times of day (`parse_clock`)."""
     rows: Floats
     """(N, columns) the rows of the head; NaN for words and empty cells."""
 
@@ -82,6 +96,9 @@ def read_head(path: Path) -> TableHead:
     data, utf16 = _read_beginning(path)
     if not utf16 and (kind := file_kind(path)):
         raise wrong_file(path, kind, EXPECTED_FILE, "Check the path.")
+    if markup := next((name for name, begin in _MARKUP.items() if begin.match(data)), ""):
+        advice = "Write its poses as CSV with the columns time,x,y,z,qx,qy,qz,qw."
+        raise BadFile(path, f"{markup}, no rows of numbers", EXPECTED_FILE, advice)
     lines = data.split("\n")
     if len(data) == _HEAD_CHARACTERS:
         lines.pop()  # it may go on
@@ -89,24 +106,36 @@ def read_head(path: Path) -> TableHead:
     plain = [line for _, line in numbered if not _COMMENT.match(line) and line.strip() != Outcome.PASS.word]
     last = plain[-max(2, min(50, len(plain) // 4)) :]
     separator, decimal = max(_FORMS, key=lambda form: _count_numbers(last, *form))
-    cells = [_split(line, separator) for line in last]
-    columns = max(Counter(map(len, cells)).items(), key=lambda pair: (pair[1], pair[0]), default=(0, 0))[0]
-    whole = [row for row in cells if len(row) == columns]
-    texts = frozenset(c for c in range(columns) if sum(_is_word(row[c], decimal) for row in whole) > 0.5 * len(whole))
-    header: list[tuple[str, ...]] = []
+    split = [_split(line, separator) for line in last]
+    columns = max(Counter(map(len, split)).items(), key=lambda pair: (pair[1], pair[0]), default=(0, 0))[0]
+    by_column = list(zip(*(row for row in split if len(row) == columns), strict=True))
+    texts = frozenset(
+        c
+        for c, cells in enumerate(by_column)
+        if 2 * sum(_parse_cell(cell, decimal) is None for cell in cells) > len(cells)
+    )
+    words = frozenset(c for c, cells in enumerate(by_column) if c not in texts and any(map(_NUMBER_WORD.match, cells)))
+    header, above = list[tuple[str, ...]](), list[tuple[str, ...]]()
     rows: list[list[float]] = []
     first_line = 0
     if _count_numbers(last, separator, decimal) >= 2 and columns <= MOST_COLUMNS:
         for number, line in numbered:
-            row = None if _COMMENT.match(line) else _parse_row(_split(line, separator), columns, texts, decimal)
-            if row is not None and (rows or np.isfinite(row).sum() >= min(2, columns - len(texts))):
+            comment = _COMMENT.match(line)
+            row_cells = tuple(_split(line[comment.end() :] if comment else line, separator))
+            row = None if comment else _parse_row(row_cells, columns, texts, decimal)
+            fewest = 1 if all(row_cells) else min(2, columns - len(texts))
+            if row is not None and (rows or np.isfinite(row).sum() >= fewest):
                 first_line = first_line or number
                 rows.append(row)
+                above = [*above, row_cells][:_MOST_ABOVE]
             elif not rows:
-                header.append(tuple(_split(_COMMENT.sub("", line, count=1), separator)))
+                header.append(row_cells)
+            elif not comment and len(rows) <= _MOST_ABOVE and np.isnan([row[0] for row in rows]).all():
+                header += [*above, row_cells]
+                rows, above, first_line = [], [], 0
     if not rows:
         raise BadFile(path, "no rows of numbers", EXPECTED_FILE, "Is it the right file?")
-    return TableHead(path, separator, decimal, tuple(header), first_line, columns, texts, np.array(rows))
+    return TableHead(path, separator, decimal, tuple(header), first_line, columns, texts, words, np.array(rows))
 
 
 def _read_beginning(path: Path) -> tuple[str, bool]:
@@ -120,12 +149,15 @@ def _read_beginning(path: Path) -> tuple[str, bool]:
     return text, utf16
 
 
-def _open_text(path: Path) -> io.TextIOWrapper:
+def _open_text(path: Path) -> io.TextIOBase:
     """A file as text with line ends of one kind; UTF-16 where its first bytes say so. Raises BadFile."""
     file = open_input_file(path, EXPECTED_FILE, MAX_BYTES)
     utf16 = file.read(2) in (b"\xff\xfe", b"\xfe\xff")
     file.seek(0)
-    return io.TextIOWrapper(file, "utf-16" if utf16 else "utf-8-sig", errors="replace")
+    text = io.TextIOWrapper(file, "utf-16" if utf16 else "utf-8-sig", errors="replace")
+    is_dtrack = DTrackText.recognises(text.readline(_LONGEST_SHOWN))
+    text.seek(0)
+    return DTrackText(text) if is_dtrack else text
 
 
 def _split(line: str, separator: str | None) -> list[str]:
@@ -139,18 +171,25 @@ def _split(line: str, separator: str | None) -> list[str]:
         return [cell.strip(' "') for cell in line.split(separator)]
 
 
-def _is_number(cell: str, decimal: str) -> bool:
-    return bool(_NUMBER.fullmatch(cell.replace(",", ".") if decimal == "," else cell))
+def _parse_cell(cell: str, decimal: str = ".") -> float | None:
+    """What a cell of a column of numbers stands for, NaN for a missing number; None for another word."""
+    cell = cell.strip(' \t"')
+    number = cell.replace(",", ".") if decimal == "," else cell
+    return float(number) if _NUMBER.fullmatch(number) else _WORDS.get(cell.lower(), parse_clock(cell))
 
 
-def _is_word(cell: str, decimal: str) -> bool:
-    return cell.lower() not in _MISSING and not _is_number(cell, decimal)
+def _convert(cell: str) -> float:
+    """`_parse_cell` for numpy. Raises ValueError."""
+    value = _parse_cell(cell)
+    if value is None:
+        raise ValueError
+    return value
 
 
 def _count_numbers(lines: Sequence[str], separator: str | None, decimal: str) -> float:
     """Median number of numbers in a line."""
-    counts = [sum(_is_number(cell, decimal) for cell in _split(line[:_LONGEST_SHOWN], separator)) for line in lines]
-    return float(np.median(counts)) if counts else 0.0
+    rows = [[_parse_cell(cell, decimal) for cell in _split(line[:_LONGEST_SHOWN], separator)] for line in lines]
+    return float(np.median([sum(cell == cell for cell in row if cell is not None) for row in rows] or [0]))
 
 
 _LONGEST_SHOWN = 1 << 16
@@ -163,11 +202,11 @@ def _parse_row(cells: Sequence[str], columns: int, texts: frozenset[int], decima
         return None
     row = [np.nan] * columns
     for c, cell in enumerate(cells):
-        if c in texts or cell.lower() in _MISSING:
+        if c in texts:
             continue
-        if not _is_number(cell, decimal):
+        if (value := _parse_cell(cell, decimal)) is None:
             return None
-        row[c] = float(cell.replace(",", ".")) if decimal == "," else float(cell)
+        row[c] = value
     return row
 
 
@@ -213,6 +252,8 @@ class _RowReader:
         self.left_out: Counter[str] = Counter()
         self.ends_whole = True
         self._head, self._columns, self._name_column = head, list(columns), name_column
+        words: frozenset[int | str] = head.word_columns.intersection(columns)
+        self._converters: dict[int | str, Callable[[str], float]] = dict.fromkeys(words, _convert)
         self._header_rows = {row for row in head.header if len(row) == head.columns}
 
     def read(self, first_line: int, text: str, last: bool) -> tuple[Floats, Ints]:
@@ -254,7 +295,12 @@ class _RowReader:
         every = separator is None and not self._head.text_columns  # then the number of cells is checked
         try:
             table = np.loadtxt(
-                lines, delimiter=separator, usecols=None if every else self._columns, comments=None, ndmin=2
+                lines,
+                delimiter=separator,
+                usecols=None if every else self._columns,
+                comments=None,
+                ndmin=2,
+                converters=self._converters,
             )
         except ValueError:
             return None

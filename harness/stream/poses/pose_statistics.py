@@ -8,6 +8,8 @@ from harness.stream.poses.pose_log import BodyPoses
 
 GAP_STEPS = 3.0
 """Steps, in median ones, from which on a pause counts as a gap [choice]."""
+FEWEST_POSES = 20
+"""Fewest poses of a body that `characterize` measures."""
 
 
 @dataclass(frozen=True)

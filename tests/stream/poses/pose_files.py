@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from harness.core import rotations
 from harness.core.arrays import Floats
@@ -85,6 +86,45 @@ def vicon_tracker() -> str:
     return rows(lambda n: f"{n + 1},0,{body(n)},{body(n)}", header)
 
 
+def qualisys(lost: range = range(0)) -> str:
+    """Two bodies in mm with matrices column by column; `marker rig` is not seen in the rows `lost`."""
+    columns = ["X", "Y", "Z", "Roll", "Pitch", "Yaw", "Residual", *(f"Rot[{n}]" for n in range(9))]
+    header = [
+        *("NO_OF_FRAMES\t300", "NO_OF_BODIES\t2", "FREQUENCY\t50", "DESCRIPTION\t--"),
+        *("TIME_STAMP\t2020-01-22, 17:47:17\t22107.99179716", "DATA_INCLUDED\t6D", "BODY_NAMES\tmarker rig\thand"),
+        "\t".join(
+            ["Frame", "Time", *(cell for name in ("marker rig", "hand") for cell in (f"{name} X", *columns[1:]))]
+        ),
+    ]
+
+    def body(row: int, seen: bool = True) -> str:
+        numbers_of = [*(1e3 * POSITIONS_M[row]), 1.0, 2.0, 3.0, 0.4, *matrix(row)[:3, :3].T.ravel()]
+        return numbers(numbers_of if seen else np.zeros(16), "\t")
+
+    return rows(lambda n: f"{n + 1}\t{TIMES_S[n]:.5f}\t{body(n, n not in lost)}\t{body(COUNT - 1 - n)}\t", header)
+
+
+def dtrack(timed: bool = True) -> str:
+    """Two bodies, the second one seen in every second frame, and a flystick that is not tracked in every fifth one."""
+
+    def pose_of(row: int) -> str:
+        return f"{numbers(1e3 * POSITIONS_M[row], ' ')}{{}}][{numbers(matrix(row)[:3, :3].T.ravel(), ' ')}]"
+
+    def frame(n: int) -> str:
+        bodies = " ".join(f"[{body} 1.000][{pose_of(n).format(' 1 2 3')}" for body in range(2 - n % 2))
+        flystick = f"6df2 1 1 [0 {-1.0 if n % 5 == 3 else 1.0:.3f} 4 2][{pose_of(n).format('')}[0 0.00 0.00]"
+        clock = f"ts {36000.0 + TIMES_S[n]:.6f}\n" if timed else ""
+        return f"fr {n + 1}\n{clock}6dcal 3\n6d {2 - n % 2} {bodies}\n{flystick}"
+
+    return rows(frame)
+
+
+def angles(order: str = "zyx", unit_rad: float = 1.0) -> Floats:
+    """(N, 3) the angles about x, y, z whose turns about the moving axes in this order give the motion."""
+    found = Rotation.from_matrix(rotations.to_matrix(QUATERNIONS)).as_euler(order.upper())  # type: ignore[call-overload]
+    return np.asarray(found[:, [order.index(axis) for axis in "xyz"]] / unit_rad)
+
+
 def matrix_lines(per_matrix: int = 4) -> str:
     """A row a line, a blank line after each matrix."""
     texts = ["\n".join(numbers(line, " ") for line in matrix(n)[:per_matrix]) for n in range(COUNT)]
@@ -136,6 +176,27 @@ SAMPLES: dict[str, str | bytes] = {
         lambda n: f"{TIMES_S[n]:.4f},{numbers(matrix(n)[:3].ravel())}",
         ["time," + ",".join(f"m{row}{column}" for row in range(3) for column in range(4))],
     ),
+    "matrices whose elements are named": rows(
+        lambda n: f"{TIMES_S[n]:.4f},{numbers(POSITIONS_M[n])},{numbers(matrix(n)[:3, :3].ravel())},0.9,7",
+        ["time,x,y,z," + ",".join(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)) + ",quality,n"],
+    ),
+    "whole matrices whose elements are named": rows(
+        lambda n: f"{TIMES_S[n]:.4f},{numbers(matrix(n).ravel())},normal",
+        ["time," + ",".join(f"m{row}{column}" for row in range(4) for column in range(4)) + ",state"],
+    ),
+    "whole matrices that count from 1": rows(
+        lambda n: f"{TIMES_S[n]:.4f},{numbers(matrix(n)[:3].ravel())},7",
+        ["time," + ",".join(f"hand.m{row}{column}" for row in range(1, 4) for column in range(1, 5)) + ",quality"],
+    ),
+    "dates": rows(lambda n: f"2024-05-01T10:00:{TIMES_S[n]:06.3f}Z,{pose(n)}", ["timestamp,x,y,z,qw,qx,qy,qz"]),
+    "dates without a header": rows(lambda n: f"2024-05-01 10:00:{TIMES_S[n]:06.3f},{pose(n)}"),
+    "times of day over midnight": rows(
+        lambda n: (
+            (f"23:59:{57 + TIMES_S[n]:.3f}" if TIMES_S[n] < 3 else f"0:00:{TIMES_S[n] - 3:06.3f}") + f",{pose(n)}"
+        ),
+        ["Uhrzeit,x,y,z,qw,qx,qy,qz"],
+    ),
+    "nanoseconds alone": rows(lambda n: f"{round(1e9 * TIMES_S[n])},{pose(n)}", ["stamp_nsec,x,y,z,qw,qx,qy,qz"]),
     "millimetres": rows(lambda n: f"{TIMES_S[n]:.4f},{pose(n, unit_m=0.001)}", ["t,x,y,z,q0,q1,q2,q3"]),
     "matrices in lines": rows(lambda n: f"{TIMES_S[n]:.4f} {numbers(matrix(n)[:3].ravel(), ' ')}"),
     "matrices column by column": rows(lambda n: f"{TIMES_S[n]:.4f},{numbers(matrix(n).T.ravel())}"),

@@ -27,11 +27,30 @@ from harness.stream.poses.column_names import ColumnName, parse_column_name
         ("field.pose.pose.orientation.x", ("quaternion", "x", "", "")),
         ("left_hand_qw", ("quaternion", "w", "left_hand", "")),
         ("RotW", ("quaternion", "w", "", "")),
-        ("roll", ("angle", "roll", "", "")),
+        ("roll", ("angle", "x", "", "")),
+        ("Yaw (deg)", ("angle", "z", "", "deg")),
+        ("hand.pitch_rad", ("angle", "y", "hand", "rad")),
+        ("euler_y", ("angle", "y", "", "")),
         ("v_RS_R_x [m s^-1]", ("", "", "", "")),
         ("field.pose.covariance0", ("", "", "", "")),
         ("velocity.x", ("", "", "", "")),
-        ("position_valid", ("", "", "", "")),
+        ("position_valid", ("valid", "", "", "")),
+        ("left_is_valid", ("valid", "", "left", "")),
+        ("isTracked", ("valid", "", "", "")),
+        ("hand_TrackingState", ("valid", "", "hand", "")),
+        ("Rot[5]", ("matrix", "5", "", "")),
+        ("hand_r21", ("matrix", "21", "hand", "")),
+        ("m_0_2", ("matrix", "02", "", "")),
+        ("sensor12", ("", "", "", "")),
+        ("date", ("time", "date", "", "")),
+        ("Zeit [s]", ("time", "time", "", "s")),
+        ("t (s)", ("time", "time", "", "s")),
+        ("Timestamp (ms)", ("time", "timestamp", "", "ms")),
+        ("time_ns", ("time", "time", "", "ns")),
+        ("timestamp_millis", ("time", "timestamp", "", "ms")),
+        ("elapsedSeconds", ("time", "time", "", "s")),
+        ("stamp.nsecs", ("nanoseconds", "", "", "")),
+        ("position_z_meters", ("position", "z", "", "m")),
         ("", ("", "", "", "")),
     ],
 )
@@ -49,5 +68,6 @@ def test_numbers_of_components_are_a_convention() -> None:
 
 def test_cells_above_tell_body_and_kind() -> None:
     assert parse_column_name(["Rigid Body", "left hand", "Rotation", "X"]) == ColumnName("quaternion", "x", "left hand")
+    assert parse_column_name(["Head Rotation", "X"]).kind == "quaternion"
     assert parse_column_name(["Rigid Body", "hand", "Position", "X"]) == ColumnName("position", "x", "hand")
     assert parse_column_name(["Rigid Body Marker", "hand:Marker1", "Position", "X"]).kind == ""

@@ -5,6 +5,7 @@ import pytest
 
 from harness.core import rotations
 from harness.stream.poses.evidence import (
+    conclude_angle_unit,
     conclude_length_unit,
     conclude_quaternion_order,
     conclude_resolution,
@@ -28,11 +29,33 @@ def test_the_size_of_steps_shows_the_unit_of_time(unit: str, start_s: float, ste
     assert ("Unix time of 2017-07-14" in found.reason) == (start_s > 0.0)
 
 
+def test_ticks_of_the_year_1_are_known() -> None:
+    found = conclude_time_unit(638_000_000_000_000_000 + 200_000 * np.arange(50.0), "", None)
+    assert (found.value, found.assumed) == ("100ns", False)
+    assert conclude_time_unit(1e5 * np.arange(50.0), "", None).value == "us"  # 10 Hz; 100 Hz in ticks
+
+
 def test_a_step_that_may_be_two_units_is_an_assumption() -> None:
     assert conclude_time_unit(SLOW, "", None).assumed
     assert conclude_time_unit(np.zeros(1), "", None).assumed
     assert conclude_time_unit(SLOW, "s", None).reason == "the column's name"
     assert conclude_time_unit(SLOW, "s", "ms").value == "ms"
+
+
+@pytest.mark.parametrize("size", [1.0, 5.0, 15.0, 60.0, 900.0, 3000.0])
+def test_units_are_alternatives_where_their_sizes_are_usual(size: float) -> None:
+    rest = np.array([size, 0.0, 0.0]) + np.zeros((50, 3))
+    found, _ = conclude_length_unit(rest, np.arange(50) / 50.0, "", None)
+    others = {1.0: "", 5.0: "", 15.0: "in", 60.0: "cm or in", 900.0: "cm", 3000.0: ""}[size]
+    assert (f"; {others} would fit as well: --unit decides" if others else "") in found.reason
+    assert ("fit as well" in found.reason) == bool(others)
+
+
+def test_units_of_angles() -> None:
+    assert conclude_angle_unit(np.array([6.29, -1.0]), "", "").value == "rad"
+    assert conclude_angle_unit(np.array([1.0, -6.4, np.nan]), "", "").value == "deg"
+    assert conclude_angle_unit(np.array([]), "deg", "").reason == "the columns' names"
+    assert conclude_angle_unit(np.array([]), "deg", "rad").value == "rad"
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e9])

@@ -4,13 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from harness.core import rotations
 from harness.core.arrays import Ints
 from harness.errors import BadFile, BadInput
 from harness.stream.poses.options import PoseFileOptions
-from harness.stream.poses.pose_file import UNTIMED as UNTIMED_CLOCK
-from harness.stream.poses.pose_file import UnknownRate, read_pose_log
+from harness.stream.poses.pose_conversion import UNTIMED as UNTIMED_CLOCK
+from harness.stream.poses.pose_conversion import UnknownRate
+from harness.stream.poses.pose_file import read_pose_log
 from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
 from tests.stream.poses.pose_files import (
     COUNT,
@@ -22,10 +24,13 @@ from tests.stream.poses.pose_files import (
     TIMES_S,
     UNTIMED,
     XYZW,
+    angles,
+    dtrack,
     euroc,
     motive,
     numbers,
     pose,
+    qualisys,
     rows,
     tum,
     vicon_tracker,
@@ -53,7 +58,7 @@ def assert_motion(body: BodyPoses, kept: slice | Ints = slice(None)) -> None:
 @pytest.mark.parametrize("name", SAMPLES)
 def test_the_motion_is_read(name: str, tmp_path: Path) -> None:
     log = read_pose_log(write(tmp_path / "rig.csv", SAMPLES[name]))
-    assert log.names == ("rig",)
+    assert log.names in (("rig",), ("hand",))
     assert_motion(log.bodies[0])
     assert all(one.reason for one in log.findings)
     assert [one.subject for one in log.findings if one.assumed] == ["up", "handedness"]
@@ -78,7 +83,7 @@ def test_comments_between_rows_are_counted(tmp_path: Path) -> None:
 
 
 def test_times_as_text_are_named(tmp_path: Path) -> None:
-    path = write(tmp_path / "a.csv", rows(lambda n: f"12:30:{n},{pose(n)}", [HEADER]))
+    path = write(tmp_path / "a.csv", rows(lambda n: f"12h30m{n}s,{pose(n)}", [HEADER]))
     with pytest.raises(UnknownRate, match=r"a.csv has no times, but text in the column 't'"):
         read_pose_log(path)
     assert_motion(read_pose_log(path, PoseFileOptions(rate_hz=RATE_HZ)).bodies[0])
@@ -148,10 +153,21 @@ def test_serial_numbers_tell_bodies(tmp_path: Path) -> None:
     assert_motion(log.bodies[1])
 
 
-def test_angles_of_optitrack_are_refused(tmp_path: Path) -> None:
-    path = write(tmp_path / "take.csv", motive().replace("Rotation Type,Quaternion", "Rotation Type,XYZ"))
-    with pytest.raises(BadFile, match="rotations of the type XYZ; expected quaternions"):
+def test_angles_of_optitrack_are_read_with_their_axes(tmp_path: Path) -> None:
+    values = angles("xyz", np.pi / 180.0)
+    header = [
+        "Format Version,1.23,Take Name,T,Export Frame Rate,50,Rotation Type,XYZ,Length Units,Meters",
+        *(",," + ",".join([cell] * 7) for cell in ("Rigid Body", "target", '"7E3"')),
+        ",,Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error",
+        "Frame,Time (Seconds),X,Y,Z,X,Y,Z,",
+    ]
+    content = rows(lambda n: f"{n},{TIMES_S[n]:.4f},{numbers(values[n])},{numbers(POSITIONS_M[n])},0.001", header)
+    path = write(tmp_path / "take.csv", content)
+    with pytest.raises(BadFile, match=r"rotations of the type XYZ; expected quaternions. .* or give --euler xyz"):
         read_pose_log(path)
+    log = read_pose_log(path, PoseFileOptions(euler="xyz", up="z"))
+    assert log.names == ("target",)
+    assert_motion(log.bodies[0])
 
 
 def test_the_program_of_vicon_is_known(tmp_path: Path) -> None:
@@ -283,6 +299,15 @@ def test_several_files_are_bodies_of_one_log(tmp_path: Path) -> None:
         (rows(line, [HEADER]).replace("0.1000", "hello"), "line 7: a word among the numbers"),
         (rows(line, [HEADER]).replace("\n0.1000,", "\n"), "line 7: a line of 7 cells; expected a row of 8 columns"),
         (rows(lambda n: f"{n},1,2,3,0.1,0.2,0.3", ["t,x,y,z,roll,pitch,yaw"]), "angles .roll, pitch, yaw. of a conv"),
+        (
+            rows(lambda n: f"{n},1,2,3,0.1,0.2,0.3", ["t,TX,TY,TZ,RX,RY,RZ"]),
+            "angles .RX, RY, RZ. .* --euler zyx is yaw",
+        ),
+        (rows(lambda n: f"{n},1,2,3,1.1,0,0,0"), "where a quaternion may stand, .* columns 5 to 8 have the norm 1.1;"),
+        ('{"t": 0.5, "p": [1, 2, 3], "q": [1, 0, 0, 0]}\n' * 9, "JSON, no rows of numbers; .* Write its poses as CSV"),
+        ('[\n {"t": 0.5}\n]\n', "JSON, no rows of numbers"),
+        ("<log>\n<pose>1 2 3</pose>\n</log>\n", "XML, no rows of numbers"),
+        (qualisys().replace("\t0.1", "\t0.9"), "matrix .* whose axes are not of length 1"),
         (rows(lambda n: f"{n},1,2,3,4,5,6", ["t,x,y,z,a,b,c"]), "no four columns of norm 1"),
         (rows(lambda n: f"{n},1,2,3,4,5,6", ["time_s,x_m,y_m,z_m,px_m,py_m,pz_m"]), "no quaternion among the columns"),
         (rows(lambda n: f"{TIMES_S[n]},1,2,3,1.2,0,0,0", [HEADER]), "a quaternion of norm 1.2 in row 1"),
@@ -348,3 +373,164 @@ def test_the_usual_order_is_that_of_euroc_for_nanoseconds(tmp_path: Path, rng: n
     for scale, usual in ((1e9, "wxyz"), (1e6, "xyzw")):
         found = finding(read_pose_log(write(tmp_path / "a.csv", content(scale))), "quaternion order")
         assert (found.value, found.assumed) == (usual, True)
+
+
+def test_qualisys_is_known(tmp_path: Path) -> None:
+    log = read_pose_log(write(tmp_path / "a.tsv", qualisys(range(5)).replace("\n", "\r\n")))
+    assert log.names == ("marker rig", "hand")
+    assert_motion(log.select(["marker rig"]).bodies[0], slice(5, None))
+    assert rotations.angle_between_rad(log.bodies[1].quaternions, QUATERNIONS[::-1]).max() < 1e-6
+    assert finding(log, "length unit") == FileFinding("length unit", "mm", "Qualisys writes mm")
+    assert finding(log, "gaps of marker rig").value == f"5 of {COUNT} rows hold no pose"
+    assert finding(log, "rotation").value == "matrix, column by column"
+    assert finding(log, "not read").value.startswith(
+        "marker rig/Roll, marker rig/Pitch, marker rig/Yaw, marker rig/Res"
+    )
+    untimed = qualisys().replace("Frame\tTime\t", "Frame\tCounter\t")
+    assert read_pose_log(write(tmp_path / "b.tsv", untimed)).clock == "samples counted at 50 Hz"
+
+
+def test_a_log_of_dtrack_is_known(tmp_path: Path) -> None:
+    log = read_pose_log(write(tmp_path / "a.txt", dtrack()))
+    assert log.names == ("body0", "body1", "flystick0")
+    assert_motion(log.bodies[0])
+    assert_motion(log.bodies[1], slice(0, None, 2))
+    assert_motion(log.bodies[2], np.flatnonzero(np.arange(COUNT) % 5 != 3))
+    assert finding(log, "length unit") == FileFinding("length unit", "mm", "DTrack writes mm")
+    assert finding(log, "untracked rows of flystick0").value == f"60 of {COUNT} left out"
+    damaged = dtrack().replace("[0 1.000][", "[0 1.000]", 3)
+    found = read_pose_log(write(tmp_path / "b.txt", damaged))
+    assert (len(found.body("body0").times_s), finding(found, "left out").value) == (COUNT - 3, "3 comment lines")
+    untimed = write(tmp_path / "c.txt", dtrack(timed=False))
+    with pytest.raises(UnknownRate, match=r"c.txt has no times, but numbers of samples"):
+        read_pose_log(untimed)
+    assert_motion(read_pose_log(untimed, PoseFileOptions(rate_hz=RATE_HZ)).bodies[0])
+
+
+def test_a_long_log_of_dtrack_is_read_in_pieces(tmp_path: Path) -> None:
+    log = read_pose_log(write(tmp_path / "a.txt", dtrack() * 40))
+    assert finding(log, "doubled rows of body0").value == "97.5 % of the rows repeat time and pose of another"
+    assert_motion(log.bodies[0])
+
+
+@pytest.mark.parametrize("state", ["is_valid", "Tracked", "TrackingState"])
+@pytest.mark.parametrize(
+    ("seen", "lost"), [("True", "False"), ("1", "0"), ("2", "0.0"), ("true", '"false"'), ("WAHR", "FALSCH")]
+)
+def test_rows_that_are_not_valid_are_left_out(state: str, seen: str, lost: str, tmp_path: Path) -> None:
+    def with_state(n: int) -> str:
+        return f"{line(n)},0.1,{lost if n % 10 == 3 else seen}"
+
+    log = read_pose_log(write(tmp_path / "a.csv", rows(with_state, [f"{HEADER},error,{state}"])))
+    assert_motion(log.bodies[0], np.flatnonzero(np.arange(COUNT) % 10 != 3))
+    assert finding(log, "untracked rows of a").value == f"30 of {COUNT} left out"
+    assert finding(log, "not read") == FileFinding("not read", "error", "not needed for times and poses")
+
+
+def test_states_that_say_nothing_or_no(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", rows(lambda n: f"{line(n)},no", [f"{HEADER},valid"]))
+    with pytest.raises(BadFile, match="no row that its column of validity calls tracked"):
+        read_pose_log(path)
+    log = read_pose_log(write(tmp_path / "b.csv", rows(lambda n: f"{line(n)},limited", [f"{HEADER},trackingState"])))
+    assert_motion(log.bodies[0])
+    assert finding(log, "not read").reason.endswith("words of unknown meaning")
+
+
+def test_a_first_row_without_a_pose_is_a_gap(tmp_path: Path) -> None:
+    content = rows(lambda n: line(n) if n else "0.0000,nan,nan,nan,nan,nan,nan,nan", [HEADER])
+    log = read_pose_log(write(tmp_path / "a.csv", content))
+    assert finding(log, "gaps of a").value == f"1 of {COUNT} rows hold no pose"
+    assert_motion(log.bodies[0], slice(1, None))
+
+
+def test_a_state_counts_for_its_body(tmp_path: Path) -> None:
+    names = [f"{body}_{axis}" for body in ("head", "hand") for axis in ("x", "y", "z", "qw", "qx", "qy", "qz", "valid")]
+    content = rows(lambda n: f"{line(n)},{int(n > 9)},{pose(n)},1", [",".join(["t", *names])])
+    log = read_pose_log(write(tmp_path / "a.csv", content))
+    assert_motion(log.select(["head"]).bodies[0], slice(10, None))
+    assert_motion(log.body("hand"))
+    shared = read_pose_log(write(tmp_path / "b.csv", content.replace("head_valid", "valid")))
+    assert_motion(shared.body("hand"), slice(10, None))
+
+
+def test_many_columns_that_are_not_read_are_counted(tmp_path: Path) -> None:
+    content = rows(lambda n: f"{line(n)}{',7' * 11}", [HEADER + "".join(f",other{n}" for n in range(11))])
+    found = finding(read_pose_log(write(tmp_path / "a.csv", content)), "not read")
+    assert found.value == ", ".join(f"other{n}" for n in range(8)) + " and 3 others"
+
+
+@pytest.mark.parametrize("order", ["xyz", "xzy", "yxz", "yzx", "zxy", "zyx"])
+@pytest.mark.parametrize("unit", ["deg", "rad"])
+def test_angles_are_read_with_their_axes(order: str, unit: str, tmp_path: Path) -> None:
+    values = angles(order, {"deg": np.pi / 180.0, "rad": 1.0}[unit])[:, ::-1]
+    content = rows(
+        lambda n: f"{TIMES_S[n]:.4f},{numbers(POSITIONS_M[n])},{numbers(values[n])}", ["t,x,y,z,yaw,pitch,roll"]
+    )
+    log = read_pose_log(write(tmp_path / "a.csv", content), PoseFileOptions(euler=order))
+    assert_motion(log.bodies[0])
+    found = finding(log, "unit of angles")
+    assert (found.value, found.assumed) == (unit, unit == "rad")
+    named = content.replace("yaw,pitch,roll", f"rz [{unit}],ry [{unit}],rx [{unit}]")
+    log = read_pose_log(write(tmp_path / "b.csv", named), PoseFileOptions(euler=order))
+    assert not finding(log, "unit of angles").assumed
+
+
+def test_the_option_of_angles(tmp_path: Path) -> None:
+    values = angles("zyx", np.pi / 180.0) / 100.0
+    content = rows(lambda n: f"{TIMES_S[n]:.4f},{numbers(POSITIONS_M[n])},{numbers(values[n])}")
+    path = write(tmp_path / "a.csv", content)
+    columns = ("time", "x", "y", "z", "roll", "pitch", "yaw")
+    log = read_pose_log(path, PoseFileOptions(columns=columns, euler="zyx:deg"))
+    expected = Rotation.from_euler("ZYX", values[:, ::-1], degrees=True).as_quat(scalar_first=True)
+    assert rotations.angle_between_rad(log.bodies[0].quaternions, expected).max() < 1e-6
+    assert finding(log, "unit of angles").reason == "given by --euler"
+    for name in ("own names", "matrices in lines"):
+        with pytest.raises(BadInput, match=r"--euler, but b.csv has no angles alone"):
+            read_pose_log(write(tmp_path / "b.csv", SAMPLES[name]), PoseFileOptions(euler="zyx"))
+
+
+def test_dates_are_unix_times(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", SAMPLES["dates"])
+    log = read_pose_log(path)
+    assert (log.clock, log.start_unix_s) == ("Unix time", 1714557600.0)
+    numbered = rows(lambda n: f"20240501,{line(n)}", [f"date,{HEADER}"])
+    assert_motion(read_pose_log(write(tmp_path / "c.csv", numbered)).bodies[0])
+    nanoseconds = read_pose_log(write(tmp_path / "b.csv", SAMPLES["nanoseconds alone"]))
+    assert finding(nanoseconds, "time unit").reason == "the column's name"
+    with pytest.raises(BadInput, match=r"a.csv has times of day"):
+        read_pose_log(path, PoseFileOptions(time_unit="ms"))
+
+
+@pytest.mark.parametrize("identifier", ["7E3", "123", "44"])
+@pytest.mark.parametrize("labels", [True, False])
+def test_identifiers_of_optitrack_are_no_numbers(identifier: str, labels: bool, tmp_path: Path) -> None:
+    content = motive().replace('"6B29FC40"', f'"{identifier}"').replace('"A1"', '"12"')
+    if not labels:
+        content = content.replace(",Type", ",").replace(",Name", ",").replace(",ID,", ",,")
+    log = read_pose_log(write(tmp_path / "a.csv", content), PoseFileOptions(up="z"))
+    assert log.names == ("head", "hand")
+    assert_motion(log.body("head"))
+
+
+def test_a_damaged_first_row_is_no_header(tmp_path: Path) -> None:
+    content = rows(line, [HEADER]).replace(line(1), "hello")
+    with pytest.raises(BadFile, match="line 3: a line of 1 cells"):
+        read_pose_log(write(tmp_path / "a.csv", content))
+
+
+def test_matrices_of_zeros_are_gaps(tmp_path: Path) -> None:
+    lines = UNTIMED["kitti"].splitlines()
+    lines[7] = " ".join(["0"] * 12)
+    log = read_pose_log(write(tmp_path / "a.txt", "\n".join(lines) + "\n"), PoseFileOptions(rate_hz=RATE_HZ))
+    assert_motion(log.bodies[0], np.flatnonzero(np.arange(COUNT) != 7))
+    assert finding(log, "gaps of a").value == f"1 of {COUNT} rows hold no pose"
+
+
+def test_angles_that_are_no_numbers_are_gaps(tmp_path: Path) -> None:
+    values = angles("zyx")[:, ::-1]
+    content = rows(
+        lambda n: f"{TIMES_S[n]:.4f},{numbers(POSITIONS_M[n])},{numbers(values[n]) if n != 7 else '1e999,nan,nan'}",
+        ["t,x,y,z,yaw,pitch,roll"],
+    )
+    log = read_pose_log(write(tmp_path / "a.csv", content), PoseFileOptions(euler="zyx:rad"))
+    assert_motion(log.bodies[0], np.flatnonzero(np.arange(COUNT) != 7))
