@@ -139,9 +139,9 @@ def nominal_mounts(calibration: Calibration, stations: Sequence[str]) -> dict[st
 
 
 def truth_of_capture(other: CaptureReadings, stations: Sequence[str]) -> TruthMotion:
-    """Another capture as the reference: its stations are the bodies, those of the same name carry the stations.
+    """Another capture as the reference: its stations are the bodies.
 
-    Times are those of its device's clock. BadInput unless it has every station.
+    Times are those of its device's clock. BadInput as `pair_names`.
     """
     bodies = {}
     for name, readings in other.readings.items():
@@ -153,16 +153,22 @@ def truth_of_capture(other: CaptureReadings, stations: Sequence[str]) -> TruthMo
     lost = (f"{other.path.name}: {text}" for text in (*other.left_out, *other.damage))
     note = "Scale, heading and clocks are those relative to the other tracker, and are not compared with a preset."
     return TruthMotion(
-        f"the capture {other.path.name}", bodies, common_names(stations, bodies), is_tracker=True, notes=(note, *lost)
+        f"the capture {other.path.name}", bodies, pair_names(stations, bodies), is_tracker=True, notes=(note, *lost)
     )
 
 
-def common_names(stations: Sequence[str], bodies: Mapping[str, TruthPoses]) -> dict[str, str]:
-    """Each station with the body of its name; BadInput unless every station has one."""
-    missing = [name for name in stations if name not in bodies]
-    if missing:
+def pair_names(stations: Sequence[str], bodies: Mapping[str, TruthPoses]) -> dict[str, str]:
+    """Each station with the body of its name, in capital or small letters, or the only one with the only body.
+
+    Stations without a body are left out. BadInput where none has one.
+    """
+    if len(stations) == len(bodies) == 1:
+        return dict(zip(stations, bodies, strict=True))
+    named = {body.lower(): body for body in bodies}
+    pairs = {station: named[station.lower()] for station in stations if station.lower() in named}
+    if not pairs:
         raise BadInput(
-            f"The reference has no body {missing[0]!r}; it has {', '.join(bodies) or 'none'}.",
+            f"The reference has no body {', '.join(stations)}; it has {', '.join(bodies) or 'none'}.",
             "Name its bodies as the stations of the capture.",
         )
-    return {name: name for name in stations}
+    return pairs

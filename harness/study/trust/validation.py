@@ -32,7 +32,7 @@ from harness.measure.reports import (
     residual_series,
 )
 from harness.stream.polhemus.codec import BITS_PER_BYTE, WireFormat, record_size
-from harness.stream.recording import RecordingStream, StationReadings
+from harness.stream.recording import StationReadings
 from harness.study.trust.capture_readings import CaptureReadings, measured_poses
 from harness.study.trust.characterization import correct_departures, preset_components, preset_values
 from harness.study.trust.truth_motion import TruthMotion
@@ -182,6 +182,7 @@ def _comparable_poses(capture: CaptureReadings, truth: TruthMotion) -> tuple[dic
     BadInput for stations without a body or without time stamps; NotComparable without a pose.
     """
     poses = {station: measured_poses(one) for station, one in capture.readings.items() if station in truth.body_of}
+    absent = ", ".join(station for station in capture.readings if station not in poses)
     if not poses:
         raise BadInput(
             f"No station of {capture.path.name} is in the reference.",
@@ -192,7 +193,9 @@ def _comparable_poses(capture: CaptureReadings, truth: TruthMotion) -> tuple[dic
     if not seen:
         raise NotComparable(f"No station of {capture.path.name} has a pose.", "Record positions and orientations.")
     unseen = ", ".join(station for station in poses if station not in seen)
-    return seen, (f"{unseen}: no pose in the whole capture; left out.",) if unseen else ()
+    notes = [f"{unseen}: no pose in the whole capture; left out."] if unseen else []
+    notes += [f"{absent}: no such body in the reference; left out."] if absent else []
+    return seen, tuple(notes)
 
 
 def _describe_clocks(capture: CaptureReadings, truth: TruthMotion, registration: Registration) -> tuple[str, ...]:
@@ -238,8 +241,7 @@ def evaluate_registered(
     capture, playback = found.capture, found.truth.playback
     if playback is None:
         raise BadInput(f"{found.truth.title} has no performer.", "Methods are scored on a clip.")
-    frames = RecordingStream(capture.path)
-    take = registered_take(frames, found.registration, playback, capture.rate_hz, found.truth.loop_s)
+    take = registered_take(capture.frames(), found.registration, playback, capture.rate_hz, found.truth.loop_s)
     return evaluate_each(methods, take, metrics=SCORED_METRICS, progress=progress)
 
 
