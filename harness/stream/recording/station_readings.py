@@ -59,6 +59,16 @@ class StationReadings:
     def __len__(self) -> int:
         return len(self.received_s)
 
+    def select(self, rows: slice | Bools) -> "StationReadings":
+        """The records of some rows."""
+        return StationReadings(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+    @staticmethod
+    def join(parts: Sequence["StationReadings"]) -> "StationReadings":
+        """The records of one or more parts, one after another."""
+        columns = (np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(StationReadings))
+        return StationReadings(*columns)
+
 
 @dataclass(frozen=True, eq=False)
 class CaptureBlock:
@@ -178,7 +188,7 @@ class _Session:
         stations = {}
         for row, name in enumerate(self.wire.stations):
             parts, self._parts[row] = self._parts[row], []
-            stations[name] = _join(parts)
+            stations[name] = StationReadings.join(parts)
             del parts
         return stations
 
@@ -252,9 +262,3 @@ def _select(readings: Readings, stamps_s: Floats, row: int) -> StationReadings:
         readings.quality[rows],
         readings.suspect[rows],
     )
-
-
-def _join(parts: Sequence[StationReadings]) -> StationReadings:
-    """The parts of one station, one after another."""
-    columns = (np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(StationReadings))
-    return StationReadings(*columns)

@@ -138,6 +138,12 @@ class _TrustTaskRun:
         self.clip = task.clip or self.note.get("clip")
         if not self.clip:
             raise BadInput(f"Nothing says which clip {task.capture} is of.", "Name the clip of each with --truth.")
+        if holds_poses(Path(self.clip)):
+            raise BadInput(
+                f"{self.clip} holds poses of bodies and no performer's motion, on which methods could be ranked.",
+                f"Name a clip. `harness validate {task.capture} --truth {self.clip} --expect UNIT.toml` tells whether "
+                "clock, scale and speed error are those of the simulation's unit.",
+            )
         if self.note.get("posing"):
             raise BadInput(f"{task.capture} is of calibration poses.", "Name captures of motion.")
         self.playback = find_playback(

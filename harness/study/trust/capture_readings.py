@@ -80,8 +80,7 @@ def read_capture(reader: CaptureReader) -> CaptureReadings:
     readings = {}
     for station in reader.wire.stations:
         parts = [block.stations[station] for block in blocks if block.session == longest]
-        columns = ([getattr(part, name) for part in parts] for name in StationReadings.__dataclass_fields__)
-        readings[station] = StationReadings(*(np.concatenate(column) for column in columns))
+        readings[station] = StationReadings.join(parts)
     return CaptureReadings(reader.path, dict(reader.note), reader.wire, readings, tuple(reader.damage), tuple(left_out))
 
 

@@ -303,16 +303,16 @@ def _checks(
         return []
     preset = preset_components()
     record_s = record_size(wire.items) * BITS_PER_BYTE / _DEFAULT_BAUD if wire else 0.0
-    known = {
+    of_preset = {
         "components.speed.ahead_s": preset_values()["components.speed.ahead_s"],
         "components.clock.drift_ppm": preset_values()["components.clock.drift_ppm"],
         "scale": Interval.normal(0.0, preset["session"]["scale"]),
         "heading_rad": Interval.normal(0.0, 0.0),
         "latency_s": Interval.normal(_DEFAULT_LATENCY_S + record_s, 0.0),
     }
+    known = of_preset if wire else {}
     if expected is not None:
-        known |= {key: one for key, one in expected.measured.items() if key in known}
-        known |= {key: one for key, one in expected.session.items() if key in known}
+        known |= {key: one for key, one in {**expected.measured, **expected.session}.items() if key in of_preset}
     checks = [
         compare_with_expected(key, "", numbers[key], one) for key, one in known.items() if numbers[key].is_measured
     ]
