@@ -27,7 +27,13 @@ def test_two_files_of_one_body_are_validated(pair: tuple[Path, Path], tmp_path: 
     assert "--least-matched" in refused.err
     words = ("validate", capture, "--truth", truth, "--least-matched", "0.6", "--out", tmp_path / "unit.toml")
     said = command(*words)
-    for text in ("scale error", "Poses of both are body-from-world and were inverted", "% of the variance", "unevenly"):
+    for text in (
+        "scale error",
+        "Times of a file of poses count from",
+        "Poses of both are body-from-world and were inverted",
+        "% of the variance",
+        "unevenly",
+    ):
         assert text in said.out
     found = command("validate", capture, "--truth", truth, "--least-matched", "0.6", "--json").content
     (late_ms,) = re.findall(r"Unix times the capture is ([\d,.]+) ms late", said.out.replace("\n  ", " "))
@@ -51,6 +57,9 @@ def test_options_of_the_reference_override_its_evidence(
         for truth, words in ((pair[1], known[4:]), (tmp_path / "bare.txt", known))
     ]
     assert said[0] == pytest.approx(said[1], abs=1e-6)
+    refused = command("validate", pair[0], "--truth", tmp_path / "bare.txt", "--least-matched", "0.6", code=2).err
+    assert "Assumed without evidence: length unit of bare.txt: " in refused
+    assert "(--truth-unit)" in refused
     assert "--truth-up 'w'" in command("validate", pair[0], "--truth", pair[1], "--truth-up", "w", code=2).err
     np.savetxt(tmp_path / "untimed.txt", rows[:, 1:], fmt="%.9f")
     assert "--truth-rate HZ" in command("validate", pair[0], "--truth", tmp_path / "untimed.txt", code=2).err

@@ -16,6 +16,8 @@ from harness.study.trust.truth_motion import TruthMotion, pair_names
 
 _CONVENTIONS = ("body", "gaps", "left out", "length unit", "quaternion order")
 """Findings about a reference that its results rest on."""
+_FLAGS = {"length unit": "unit", "quaternion order": "quaternion"}
+"""Finding -> option that replaces it."""
 
 
 def open_capture(path: Path, options: PoseFileOptions | None = None) -> CaptureReadings:
@@ -66,8 +68,21 @@ def truth_of_log(
         f"the poses of {log.source}, {log.duration_s:.1f} s",
         bodies,
         pair_names(stations, bodies),
-        is_log=True,
-        start_unix_s=log.start_unix_s,
+        log=log,
         noise=noise or {},
-        notes=tuple(f"Reference: {sentence}" for sentence in (*_sampling(log), *concluded)),
+        notes=(
+            *(f"Reference: {sentence}" for sentence in (*_sampling(log), *concluded)),
+            "Times of a file of poses count from its first pose.",
+        ),
     )
+
+
+def describe_doubts(capture: PoseLog | None, reference: PoseLog | None) -> str:
+    """What was assumed of two logs without evidence, and with which option to say otherwise; "" for nothing."""
+    doubts = [
+        f"{finding.subject} of {log.source}: {finding.value} (--{prefix}{_FLAGS[finding.subject]})"
+        for log, prefix in ((capture, ""), (reference, "truth-"))
+        for finding in (log.findings if log else ())
+        if finding.assumed and finding.subject in _FLAGS
+    ]
+    return f" Assumed without evidence: {', '.join(doubts)}." if doubts else ""

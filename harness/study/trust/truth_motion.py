@@ -17,6 +17,7 @@ from harness.experiment import Playback
 from harness.experiment.scenarios import Scenario
 from harness.measure import TruthPoses
 from harness.simulate import exact_calibration, loop_motion
+from harness.stream import PoseLog
 from harness.study.trust.capture_readings import CaptureReadings, measured_poses
 
 _MARGIN_S = 0.5
@@ -49,10 +50,8 @@ class TruthMotion:
     """Whether the reference's clock is the host's clock of the capture, so that latency shows."""
     is_tracker: bool = False
     """Whether the reference is a tracker too, with errors of its own that a comparison with a preset would name."""
-    is_log: bool = False
-    """Whether the reference is a pose log, whose conventions nobody states."""
-    start_unix_s: float | None = None
-    """Unix time of time 0 of a pose log [s]; None where it does not tell."""
+    log: PoseLog | None = None
+    """The pose log that the reference is, whose conventions nobody states; None for another reference."""
     noise: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Body -> standard deviations of its positions [m] and rotations [rad] on each axis, where they are known."""
     loop_s: float = math.inf

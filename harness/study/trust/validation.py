@@ -35,6 +35,7 @@ from harness.stream.polhemus.codec import BITS_PER_BYTE, WireFormat, record_size
 from harness.stream.recording import StationReadings
 from harness.study.trust.capture_readings import CaptureReadings, measured_poses
 from harness.study.trust.characterization import correct_departures, preset_components, preset_values
+from harness.study.trust.logged_poses import describe_doubts
 from harness.study.trust.truth_motion import TruthMotion
 
 SCORED_METRICS = ("joint_angle_mean_deg", "mpjpe_mm", "root_position_mm", "jitter_m_s3")
@@ -100,18 +101,21 @@ def validate_capture(
     progress("registration", 1, 3)
     bodies: Mapping[str, TruthPoses] = truth.bodies
     directions: tuple[str, ...] = ()
-    if wire is None and truth.is_log:
-        named = {station: truth.body_of[station] for station in poses}
-        poses, bodies, directions = same_directions(poses, truth.bodies, named)
-    pairs, exchanged = _identify(poses, replace(truth, bodies=bodies))
-    registration = register_poses(
-        poses,
-        bodies,
-        pairs=pairs,
-        least_matched=options.least_matched,
-        plain=wire is None,
-        truth_noise=dict.fromkeys(bodies, options.truth_noise) if options.truth_noise else truth.noise,
-    )
+    try:
+        if wire is None and truth.log:
+            named = {station: truth.body_of[station] for station in poses}
+            poses, bodies, directions = same_directions(poses, truth.bodies, named)
+        pairs, exchanged = _identify(poses, replace(truth, bodies=bodies))
+        registration = register_poses(
+            poses,
+            bodies,
+            pairs=pairs,
+            least_matched=options.least_matched,
+            plain=wire is None,
+            truth_noise=dict.fromkeys(bodies, options.truth_noise) if options.truth_noise else truth.noise,
+        )
+    except BadInput as error:
+        raise type(error)(error.what, error.advice + describe_doubts(capture.log, truth.log)) from error
     progress("accuracy", 2, 3)
     numbers = {
         "time_offset_orientation_s": registration.values["time_offset_orientation_s"],
@@ -200,7 +204,7 @@ def _comparable_poses(capture: CaptureReadings, truth: TruthMotion) -> tuple[dic
 
 def _describe_clocks(capture: CaptureReadings, truth: TruthMotion, registration: Registration) -> tuple[str, ...]:
     """The offset between Unix times, where both logs have them."""
-    start_s, other_s = capture.note.get("start_unix_s"), truth.start_unix_s
+    start_s, other_s = capture.note.get("start_unix_s"), truth.log and truth.log.start_unix_s
     if start_s is None or other_s is None:
         return ()
     offset_s = registration.values["time_offset_orientation_s"].value + start_s - other_s
