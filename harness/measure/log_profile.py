@@ -59,7 +59,7 @@ def measure_log_profile(
     counted = log.clock if log.is_counted else ""
     rate_hz = round(1.0 / mean_period_s([body.times_s for body in bodies]), 3)
     collected = CollectedReadings(rate_hz, bar)
-    raw = {body.name: _raw(body, kept[body.name]) for body in bodies}
+    raw = {body.name: StationReadings.of_body(body).select(kept[body.name]) for body in bodies}
     begins_s = np.array([0.0, *(at_s for at_s, _ in marks)])
     ends_s = np.append(begins_s[1:], np.inf)
     for begin_s, end_s, stretch in zip(begins_s, ends_s, ["", *(name for _, name in marks)], strict=True):
@@ -116,14 +116,6 @@ def _fit(
 
 def _between(readings: StationReadings, begin_s: float, end_s: float) -> StationReadings:
     return readings.select((readings.measured_s >= begin_s) & (readings.measured_s < end_s))
-
-
-def _raw(body: BodyPoses, kept: Bools) -> StationReadings:
-    time_s = body.times_s[kept]
-    count = len(time_s)
-    return StationReadings(
-        time_s, time_s, time_s, body.positions_m[kept], body.quaternions[kept], np.ones(count), np.zeros(count, bool)
-    )
 
 
 def _describe(body: BodyPoses, kept: Bools, series: EvenSeries, counted: str) -> list[str]:

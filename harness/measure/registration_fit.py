@@ -360,7 +360,7 @@ def _inverse(matrix: Floats, free: Sequence[int]) -> Floats:
     """Pseudoinverse of the rows and columns of free parameters; zero elsewhere."""
     inside, out = np.ix_(free, free), np.zeros_like(matrix)
     scale = np.sqrt(np.maximum(np.diag(matrix)[free], 1e-300))
-    out[inside] = np.linalg.pinv(matrix[inside] / scale[:, None] / scale, rcond=1e-13) / scale[:, None] / scale
+    out[inside] = np.linalg.pinv(matrix[inside] / scale[:, None] / scale, rcond=1e-12) / scale[:, None] / scale
     return out
 
 
@@ -385,11 +385,7 @@ def _free(size: int, fixed: Sequence[int]) -> list[int]:
 
 def _solve(information: Floats, score: Floats, fixed: Sequence[int]) -> Floats:
     """Solution of the normal equations; parameters without information, and fixed ones, do not move."""
-    free = _free(len(score), fixed)
-    out = np.zeros(len(score))
-    scale = np.sqrt(np.maximum(np.diag(information)[free], 1e-300))
-    scaled = information[np.ix_(free, free)] / scale[:, None] / scale
-    out[free] = np.linalg.lstsq(scaled, score[free] / scale, rcond=1e-12)[0] / scale
+    out: Floats = _inverse(information, _free(len(score), fixed)) @ score
     return out
 
 

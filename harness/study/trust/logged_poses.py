@@ -3,12 +3,10 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from harness.core import rotations
 from harness.errors import BadInput
 from harness.measure import TruthPoses, describe_sampling
-from harness.stream import BodyPoses, PoseFileOptions, PoseLog
+from harness.stream import PoseFileOptions, PoseLog
 from harness.stream.recording import CaptureReader, PoseRecording, StationReadings
 from harness.study.trust.capture_readings import CaptureReadings, read_capture
 from harness.study.trust.pose_source import holds_poses, read_poses
@@ -30,29 +28,16 @@ def open_capture(path: Path, options: PoseFileOptions | None = None) -> CaptureR
 
 
 def readings_of_poses(recording: PoseRecording) -> CaptureReadings:
-    """The bodies of a file of poses as stations. The log's clock is both the device's and the host's."""
+    """The bodies of a file of poses as stations."""
     log = recording.log
     note = {**recording.note, "source": "poses", "start_unix_s": log.start_unix_s}
-    readings = {body.name: _readings(body) for body in log.bodies}
+    readings = {body.name: StationReadings.of_body(body) for body in log.bodies}
     return CaptureReadings(recording.path, note, None, readings, recording.damage, _sampling(log), log)
 
 
 def _sampling(log: PoseLog) -> tuple[str, ...]:
     counted = log.clock if log.is_counted else ""
     return tuple(describe_sampling(body.name, body.times_s, counted) for body in log.bodies)
-
-
-def _readings(body: BodyPoses) -> StationReadings:
-    count = len(body.times_s)
-    return StationReadings(
-        body.times_s,
-        body.times_s,
-        body.times_s,
-        body.positions_m,
-        body.quaternions,
-        np.ones(count),
-        np.zeros(count, bool),
-    )
 
 
 def truth_of_log(
