@@ -231,19 +231,11 @@ class _NormalSums:
 
     information: Floats
     """(P, P) of the parameters that a reading is used for."""
-    coupling: Floats
-    """(P, P) slopes of positions by rotations and clocks, which plain least squares do not find by them."""
+    whole: Floats
+    """(P, P) derivative of the score: for plain least squares with the slopes of positions by rotations and clocks."""
     blocks: tuple[_Block, ...]
     count: int
     """Number of blocks of time."""
-
-    @property
-    def whole(self) -> Floats:
-        """(P, P) derivative of the score: block triangular for plain least squares."""
-        out = self.information.copy()
-        cross = np.ix_([i for i in range(len(out)) if i not in _BY_ORIENTATIONS], _BY_ORIENTATIONS)
-        out[cross] += self.coupling[cross]
-        return out
 
     @property
     def meat(self) -> Floats:
@@ -268,7 +260,7 @@ def _whitened_step(
 ) -> tuple[Floats, _NormalSums]:
     """One step of least squares, and its sums; without `by_block` those of blocks are left out."""
     size = SHARED + OWN * len(grids)
-    information, coupling, score = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
+    information, whole, score = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
     blocks, counts = list[_Block](), list[int]()
     for s, grid in enumerate(grids):
         residual, slope = _linear(state, s, grids, truths)
@@ -276,8 +268,7 @@ def _whitened_step(
         if not plain:  # correlated noise needs every place of the grid
             residual, slope = _spread(residual, grid.known), _spread(slope, grid.known)
             places = np.arange(len(grid.known))
-        own, mine = list[Floats](), np.ix_(_columns(s), _columns(s))
-        gradient = np.zeros((len(residual), SHARED + OWN))
+        own, rests, mine = list[Floats](), list[Floats](), np.ix_(_columns(s), _columns(s))
         weights = _alike(noise[s]) if plain else noise[s]
         for process, axes in zip(weights, _AXES, strict=True):
             valid = used[s][places, int(axes[0] >= 3)]
@@ -289,19 +280,19 @@ def _whitened_step(
                 if plain and axis < 3:
                     chosen = rows.copy()
                     chosen[:, _BY_ORIENTATIONS] = 0.0
-                    coupling[mine] += chosen.T @ rows
                 information[mine] += chosen.T @ chosen
-                gradient += chosen * errors[:, None]
+                whole[mine] += chosen.T @ rows
+                score[_columns(s)] += chosen.T @ errors
                 own.append(chosen)
-        score[_columns(s)] += gradient.sum(axis=0)
+                rests.append(errors)
         if by_block:
-            parts, together = _block_parts(grid, places, noise[s]), np.stack(own, axis=1)
+            parts = _block_parts(grid, places, noise[s])
+            slopes, errors = np.stack(own, axis=1), np.stack(rests, axis=1)
             for part in parts:
-                rows = together[part].reshape(-1, SHARED + OWN)
-                blocks.append(_Block(_columns(s), rows.T @ rows, gradient[part].sum(axis=0)))
+                rows = slopes[part].reshape(-1, SHARED + OWN)
+                blocks.append(_Block(_columns(s), rows.T @ rows, rows.T @ errors[part].reshape(-1)))
             counts.append(len(parts))
-    sums = _NormalSums(information, coupling, tuple(blocks), min(counts, default=0))
-    return _solve(sums.whole, score, fixed), sums
+    return _solve(whole, score, fixed), _NormalSums(information, whole, tuple(blocks), min(counts, default=0))
 
 
 def _block_parts(grid: StationGrid, places: Ints, noise: StationNoise) -> list[slice]:
