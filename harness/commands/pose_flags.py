@@ -4,7 +4,7 @@ import argparse
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from harness.core.units import TIME_UNITS_S, parse_length_unit
 from harness.errors import BadFile, BadInput
@@ -40,9 +40,11 @@ def pose_options(args: argparse.Namespace, *, untimed: bool = False, prefix: str
     """What the flags say; `untimed` reads files without times and rate all the same. Raises BadInput."""
     from harness.stream import PoseFileOptions
 
-    names, unit_m, *others = (getattr(args, prefix.replace("-", "_") + name) for name in POSE_FLAGS)
-    columns = None if names is None else tuple(name.strip() for name in names.split(","))
-    return PoseFileOptions(columns, unit_m, *others, untimed)
+    told = {name: getattr(args, f"{prefix}{name}".replace("-", "_")) for name in POSE_FLAGS}
+    columns = None if told["columns"] is None else tuple(name.strip() for name in told["columns"].split(","))
+    return PoseFileOptions(
+        columns, told["unit"], told["quaternion"], told["up"], told["time_unit"], told["rate"], untimed
+    )
 
 
 @contextmanager
@@ -52,7 +54,7 @@ def naming_truth_flags() -> Iterator[None]:
     try:
         yield
     except (BadFile, BadInput) as error:
-        words = [
+        words: list[Any] = [
             re.sub(rf"--(?={flags})", f"--{TRUTH_PREFIX}", word) if isinstance(word, str) else word
             for word in error.args
         ]

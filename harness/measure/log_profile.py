@@ -63,10 +63,9 @@ def measure_log_profile(
     begins_s = np.array([0.0, *(at_s for at_s, _ in marks)])
     ends_s = np.append(begins_s[1:], np.inf)
     for begin_s, end_s, stretch in zip(begins_s, ends_s, ["", *(name for _, name in marks)], strict=True):
-        within = {name: _between(one, begin_s, end_s) for name, one in raw.items()}
-        if records := sum(map(len, within.values())):
+        if records := sum(int(np.sum((b.times_s >= begin_s) & (b.times_s < end_s))) for b in bodies):
             collected.add_length(stretch, min(end_s, log.duration_s) - begin_s, records)
-            collected.add_motion(stretch, within)
+        collected.add_motion(stretch, {name: _between(one, begin_s, end_s) for name, one in raw.items()})
         for name, even in series.items():
             for part in even.parts:
                 collected.add_rest(stretch, name, _between(part, begin_s, end_s), even.rate_hz)

@@ -23,7 +23,7 @@ def open_capture(path: Path, options: PoseFileOptions | None = None) -> CaptureR
     if holds_poses(path):
         return readings_of_poses(read_poses([path], options or PoseFileOptions()))
     if options not in (None, PoseFileOptions()):
-        raise BadInput(f"Units or columns of poses with {path.name}.", "They are for poses of another program.")
+        raise BadInput(f"--unit or the like with {path.name}.", "It is for poses of another program: leave it out.")
     return read_capture(CaptureReader(path))
 
 
@@ -67,7 +67,8 @@ def describe_doubts(capture: PoseLog | None, reference: PoseLog | None) -> str:
     doubts = [
         f"{finding.subject} of {log.source}: {finding.value} (--{prefix}{_FLAGS[finding.subject]})"
         for log, prefix in ((capture, ""), (reference, "truth-"))
-        for finding in (log.findings if log else ())
+        if log
+        for finding in log.findings
         if finding.assumed and finding.subject in _FLAGS
     ]
     return f" Assumed without evidence: {', '.join(doubts)}." if doubts else ""

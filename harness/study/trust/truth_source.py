@@ -50,9 +50,7 @@ def load_truth(capture: CaptureReadings, source: TruthSource) -> TruthMotion:
     if holds_poses(path) or suffix in _POSE_SUFFIXES:
         return truth_of_log(read_poses([path], options).log, stations)
     if options != PoseFileOptions():
-        raise BadInput(
-            f"--truth-unit or the like with {source.name}.", "It is for poses of another program: leave it out."
-        )
+        raise BadInput(f"--unit or the like with {source.name}.", "It is for poses of another program: leave it out.")
     if suffix.lstrip(".") in (*CLIP_FORMATS, "asf"):
         return truth_of_clip(read_clip(path), _scenario_of(capture, source), stations)
     if path.is_file():
