@@ -283,8 +283,9 @@ def _whitened_step(
                 information[mine] += chosen.T @ chosen
                 whole[mine] += chosen.T @ rows
                 score[_columns(s)] += chosen.T @ errors
-                own.append(chosen)
-                rests.append(errors)
+                if by_block:
+                    own.append(chosen)
+                    rests.append(errors)
         if by_block:
             parts = _block_parts(grid, places, noise[s])
             slopes, errors = np.stack(own, axis=1), np.stack(rests, axis=1)
