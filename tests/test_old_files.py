@@ -1,4 +1,4 @@
-"""Files that 23b301b7 wrote are still read, and have the values that they had (`tests/old_files/README.md`)."""
+"""Files that earlier versions wrote are still read, and have the values that they had (`tests/old_files/README.md`)."""
 
 import csv
 import json
@@ -19,7 +19,7 @@ from harness.measure import read_unit_file
 from harness.results import load_results, open_study
 from harness.results.findings import read_findings, read_placement
 from harness.simulate.physics import read_mcf
-from harness.stream.recording import RecordingStream, read_recording
+from harness.stream.recording import RecordingStream, open_poses, read_recording
 from harness.study.trust.plan import plan_digest
 from harness.study.trust.trust_study import run_trust_study
 from tests.command import Command
@@ -200,3 +200,21 @@ def test_no_file_is_left_out(old: Path) -> None:
         *("walking.rec", "boxing.rec", "line.rec", "commands.rec", "marks.rec", "constellation.mcf"),
         *("poses.toml", "tpose.toml", "unit.toml", "validated.toml", "table.csv", "table.md", "table.tex"),
     }
+
+
+def test_recordings_of_poses_and_of_a_fastrak(tmp_path: Path) -> None:
+    unpack_files(tmp_path, "759b847b")
+    assert {path.name for path in tmp_path.iterdir()} == {"poses.rec", "vrpn.rec", "fastrak.rec"}
+    found = open_poses([tmp_path / "poses.rec"])
+    assert (found.plan, found.marks, found.damage) == (PLAN_DIGEST, ((0.0, "static"), (0.4, "slow")), ())
+    assert {body.name: len(body.times_s) for body in found.log.bodies} == {"left": 40, "right": 38}
+    np.testing.assert_allclose(found.log.bodies[0].positions_m[-1], (-0.37018, 0.18579, 1.239), atol=1e-12)
+    np.testing.assert_allclose(found.log.bodies[1].quaternions[-1], (0.99615354, 0.0, 0.0, 0.08762496), atol=1e-8)
+    assert "length unit: mm (coordinates reach 1237 and speeds 2421 a second)" in map(str, found.log.findings)
+    served = open_poses([tmp_path / "vrpn.rec"]).log
+    assert (served.names, served.start_unix_s) == (("left_hand", "right_hand"), 1795834013.64178)
+    np.testing.assert_allclose(served.bodies[0].positions_m[-1], (-0.08946259, -0.92344383, 1.10771957), atol=1e-8)
+    stream = RecordingStream(tmp_path / "fastrak.rec")
+    frames = list(stream)
+    assert (stream.wire.family, len(frames), stream.recording.damage) == ("fastrak", 60, ())
+    np.testing.assert_allclose(frames[-1].position_m[0], (-0.23651972, -0.51670048, 1.12104897), atol=1e-8)

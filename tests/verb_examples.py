@@ -7,7 +7,7 @@ from pathlib import Path
 
 from harness.cli import build_parser
 
-ARCHIVE = Path(__file__).parent / "old_files" / "23b301b7.tar.xz"
+ARCHIVES = Path(__file__).parent / "old_files"
 NEEDS_NONE = {
     "demo": "it has a scenario of its own",
     "list": "without words it lists everything",
@@ -45,9 +45,9 @@ EXAMPLES = {
 """Verb -> words. Nothing answers at the port of `live`: what it prints first comes before the port is opened."""
 
 
-def unpack_files(folder: Path) -> None:
-    """Unpack the files that the examples name."""
-    with tarfile.open(ARCHIVE) as archive:
+def unpack_files(folder: Path, version: str = "23b301b7") -> None:
+    """Unpack the files of a version; the examples name those of the first."""
+    with tarfile.open(ARCHIVES / f"{version}.tar.xz") as archive:
         archive.extractall(folder, filter="data")
 
 

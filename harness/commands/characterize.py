@@ -18,7 +18,7 @@ from harness.commands.flags import (
     tracker_config,
 )
 from harness.commands.output import print_result, print_status, recording_note, show_progress, this_command
-from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, pose_options
 from harness.commands.unit_results import UnitOptions, add_unit_flags, departure_content, read_expected, write_unit
 from harness.core.network import FASTRAK_PREFIX, VRPN_PREFIX
 from harness.core.package_data import VERSION
@@ -64,6 +64,7 @@ def run_characterize(args: argparse.Namespace) -> Outcome:
     from harness.stream import PoseFileOptions
     from harness.stream.recording import CaptureReader
     from harness.study.trust.characterization import characterize_capture, characterize_log
+    from harness.study.trust.pose_source import holds_poses, read_poses
     from harness.study.trust.survey_file import read_surveyed_points
 
     options = UnitOptions(args.out, args.expect, args.force)

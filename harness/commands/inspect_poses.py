@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from harness.commands.flags import repeat_flags
 from harness.commands.output import print_result
-from harness.commands.pose_flags import POSE_FLAGS, pose_options, read_poses
+from harness.commands.pose_flags import POSE_FLAGS, pose_options
 from harness.core.number_format import count_noun, format_fixed, format_share
 from harness.core.text_table import Table
 from harness.errors import Outcome
@@ -24,6 +24,7 @@ _HEAD = ("body", "poses", "rate [Hz]", "90 % of steps [ms]", "gaps", "longest ga
 def inspect_poses(args: argparse.Namespace, paths: Sequence[Path]) -> Outcome:
     """Print what one file of poses is, or several on one clock."""
     from harness.stream import FEWEST_POSES, UNTIMED, measure_sampling
+    from harness.study.trust.pose_source import read_poses
 
     found = read_poses(paths, pose_options(args, untimed=True))
     log, timed = found.log, found.log.clock != UNTIMED

@@ -1,69 +1,62 @@
-"""Flags of verbs that read poses of other programs, and the reading: text files, recordings of poses, C3D clusters."""
+"""Flags of verbs that read poses of other programs."""
 
 import argparse
-from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
 from harness.core.units import TIME_UNITS_S, parse_length_unit
-from harness.errors import BadInput
+from harness.errors import BadFile, BadInput
 
 if TYPE_CHECKING:
     from harness.stream import PoseFileOptions
-    from harness.stream.recording import PoseRecording
 
 POSE_FLAGS = ("columns", "unit", "quaternion", "euler", "up", "time_unit", "rate")
 """Flags of `add_pose_flags`, as attributes of the parsed command line."""
-MARKER_SUFFIX = ".c3d"
+TRUTH_PREFIX = "truth-"
+"""Prefix of the same flags for the reference."""
 
 
-def add_pose_flags(verb: argparse.ArgumentParser, *, shared: Sequence[str] = ()) -> None:
+def add_pose_flags(verb: argparse.ArgumentParser, *, shared: Sequence[str] = (), prefix: str = "") -> None:
     """Add the flags by which a user overrides what a file of poses shows; `shared` ones the verb has already."""
-    poses = verb.add_argument_group("of poses of other programs (TUM, EuRoC, CSV, matrices), in place of the evidence")
+    of = "of a reference with such poses" if prefix else "of poses of other programs (TUM, EuRoC, CSV, matrices)"
+    poses = verb.add_argument_group(f"{of}, in place of the evidence")
     text = "names of the columns in their order, such as time,x,y,z,qx,qy,qz,qw; - for others"
-    poses.add_argument("--columns", metavar="A,B", help=text)
-    poses.add_argument("--quaternion", metavar="ORDER", help="order of a quaternion: xyzw or wxyz")
+    poses.add_argument(f"--{prefix}columns", metavar="A,B", help=text)
+    poses.add_argument(f"--{prefix}quaternion", metavar="ORDER", help="order of a quaternion: xyzw or wxyz")
     text = "axes about which angles turn, as the body then stands: zyx is yaw, pitch, roll; unit: zyx:deg or zyx:rad"
-    poses.add_argument("--euler", metavar="AXES", help=text)
-    poses.add_argument("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y or -z (write --up=-y)")
-    poses.add_argument("--time-unit", metavar="U", help=f"unit of times: {', '.join(TIME_UNITS_S)}")
+    poses.add_argument(f"--{prefix}euler", metavar="AXES", help=text)
+    text = f"axis that points up: x, y, z, -x, -y or -z (write --{prefix}up=-y)"
+    poses.add_argument(f"--{prefix}up", metavar="AXIS", help=text)
+    poses.add_argument(f"--{prefix}time-unit", metavar="U", help=f"unit of times: {', '.join(TIME_UNITS_S)}")
     if "unit" not in shared:
         text = "unit of length: mm, cm, m, in, ft, or metres per unit"
-        poses.add_argument("--unit", metavar="M", type=parse_length_unit, help=text)
+        poses.add_argument(f"--{prefix}unit", metavar="M", type=parse_length_unit, help=text)
     if "rate" not in shared:
-        poses.add_argument("--rate", metavar="HZ", type=float, help="samples per second of a file without times")
+        text = "samples per second of a file without times"
+        poses.add_argument(f"--{prefix}rate", metavar="HZ", type=float, help=text)
 
 
-def pose_options(args: argparse.Namespace, *, untimed: bool = False) -> "PoseFileOptions":
+def pose_options(args: argparse.Namespace, *, untimed: bool = False, prefix: str = "") -> "PoseFileOptions":
     """What the flags say; `untimed` reads files without times and rate all the same. Raises BadInput."""
     from harness.stream import PoseFileOptions
 
-    columns = None if args.columns is None else tuple(name.strip() for name in args.columns.split(","))
-    return PoseFileOptions(columns, args.unit, args.quaternion, args.up, args.time_unit, args.rate, untimed, args.euler)
+    given = {name: getattr(args, f"{prefix}{name}".replace("-", "_")) for name in POSE_FLAGS}
+    names, unit_m, rate_hz = given.pop("columns"), given.pop("unit"), given.pop("rate")
+    columns = None if names is None else tuple(name.strip() for name in names.split(","))
+    return PoseFileOptions(columns=columns, unit_m=unit_m, rate_hz=rate_hz, untimed=untimed, **given)
 
 
-def holds_poses(path: Path) -> bool:
-    """Whether a file may hold poses: a recording of them, rows of numbers, or markers; never motion of a skeleton."""
-    from harness.mocap import CLIP_FORMATS
-    from harness.stream.recording import is_pose_file
-
-    kind = path.suffix.lower()
-    if kind in (*(f".{kind}" for kind in CLIP_FORMATS), ".asf"):
-        return kind == MARKER_SUFFIX and path.is_file()
-    return is_pose_file(path)
-
-
-def read_poses(paths: Sequence[Path], options: "PoseFileOptions") -> "PoseRecording":
-    """Read a recording of poses, files of other programs, or clusters of markers. Raises BadFile or BadInput."""
-    from harness.stream import PoseFileOptions
-    from harness.stream.recording import PoseRecording, open_poses
-
-    if not any(path.suffix.lower() == MARKER_SUFFIX for path in paths):
-        return open_poses(paths, options)
-    if len(paths) > 1:
-        raise BadInput(f"{len(paths)} files with markers among them.", "Name one C3D file alone.")
-    if options != PoseFileOptions(unit_m=options.unit_m, untimed=options.untimed):
-        raise BadInput(f"Options of text files for {paths[0].name}.", "A C3D file takes --unit alone.")
-    from harness.study.trust.marker_poses import read_marker_poses
-
-    return PoseRecording(paths[0], read_marker_poses(paths[0], options.unit_m), {})
+@contextmanager
+def naming_truth_flags() -> Iterator[None]:
+    """Errors about the file of the reference advise its own flags."""
+    flags = "|".join(name.replace("_", "-") for name in POSE_FLAGS)
+    try:
+        yield
+    except (BadFile, BadInput) as error:
+        words: list[Any] = [
+            re.sub(rf"--(?={flags})", f"--{TRUTH_PREFIX}", word) if isinstance(word, str) else word
+            for word in error.args
+        ]
+        raise type(error)(*words) from error

@@ -21,7 +21,7 @@ from harness.commands.flags import (
 )
 from harness.commands.output import print_result, print_status, recording_note, show_progress
 from harness.commands.playback_flags import PlaybackOptions, open_playback
-from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, pose_options
 from harness.core.network import VRPN_PREFIX
 from harness.core.package_data import VERSION
 from harness.errors import BadInput, Outcome
@@ -77,6 +77,8 @@ def add_record(verbs: Verbs) -> None:
 
 
 def run_record(args: argparse.Namespace) -> Outcome:
+    from harness.study.trust.pose_source import holds_poses
+
     paths = [Path(port) for port in args.port]
     if len(paths) > 1 or holds_poses(paths[0]):
         return _record_poses(args, paths)
@@ -142,6 +144,7 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
 def _record_poses(args: argparse.Namespace, paths: Sequence[Path]) -> Outcome:
     """Keep poses of another program in the recording format, whole or not at all."""
     from harness.stream.recording import write_pose_recording
+    from harness.study.trust.pose_source import read_poses
 
     lines = (
         *(name for name in LINE_FLAGS),

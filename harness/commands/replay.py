@@ -18,7 +18,7 @@ from harness.commands.flags import (
     repeat_flags,
 )
 from harness.commands.output import print_caveat, print_data, print_result, print_status
-from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, pose_options
 from harness.core.interrupts import defer_interrupts
 from harness.core.number_format import format_fixed
 from harness.core.progress import ProgressBar
@@ -68,6 +68,7 @@ def add_replay(verbs: Verbs) -> None:
 
 def run_replay(args: argparse.Namespace) -> Outcome:
     from harness.stream.recording import RecordingStream, parse_speed, read_recording
+    from harness.study.trust.pose_source import holds_poses
 
     speed = parse_speed(args.speed or ("1" if args.vrpn else "max"))
     if args.anywhere and args.vrpn is None:
@@ -124,6 +125,7 @@ def _print_answers(args: argparse.Namespace, recording: "Recording") -> Outcome:
 def _replay_poses(args: argparse.Namespace, speed: "ReplaySpeed") -> Outcome:
     """Play poses of another program: frames alone, because nothing tells the body that carried them."""
     from harness.stream.recording import PoseLogStream
+    from harness.study.trust.pose_source import read_poses
 
     advice = "Poses of another program name no performer, mounts or motion: leave it out."
     refuse_flags(args, _SCORING, f"with the poses of {args.file.name}", advice)

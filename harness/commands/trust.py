@@ -13,7 +13,7 @@ def add_trust(verbs: Verbs) -> None:
     text = "tell whether the fitted simulation ranks methods as a device does; the same command resumes"
     verb = add_verb(verbs, "trust", text, run_trust, "out", "mocap")
     verb.add_argument("plan", type=Path, help="plan in TOML: methods, sets of stations, metrics with margins")
-    text = "recordings of the device that `harness record --plan` made, one for each clip or more"
+    text = "recordings of the device or of its poses that `harness record --plan` made, one for each clip or more"
     verb.add_argument("captures", type=Path, nargs="+", metavar="CAPTURE", help=text)
     text = "clip of each capture, in their order (default: the clip that the capture names)"
     verb.add_argument("--truth", nargs="+", default=(), metavar="CLIP", help=text)

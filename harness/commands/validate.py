@@ -4,9 +4,9 @@ import argparse
 import math
 from pathlib import Path
 
-from harness.commands.flags import Verbs, add_verb, parse_pair, refuse_flags, share, split_list
+from harness.commands.flags import Verbs, add_verb, parse_pair, share, split_list
 from harness.commands.output import print_result, this_command
-from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
+from harness.commands.pose_flags import TRUTH_PREFIX, add_pose_flags, naming_truth_flags, pose_options
 from harness.commands.unit_results import UnitOptions, add_unit_flags, departure_content, read_expected, write_unit
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
@@ -17,9 +17,8 @@ def add_validate(verbs: Verbs) -> None:
     verb = add_verb(verbs, "validate", text, run_validate, "mocap")
     verb.add_argument("capture", type=Path, help="a recording, or a file of poses of another program")
     text = (
-        "the reference: a clip of the capture's scenario or of a library, another capture, a C3D file with three or "
-        "more markers a station (head_1, head_2, head_3), a TUM file or folder with NAME.tum, or a CSV table; beside a "
-        "file of poses also any other one"
+        "the reference: a clip of the capture's scenario or of a library, another capture, poses of another program "
+        "(one file, or a folder with STATION.tum or .csv), or a C3D file with three or more markers a station"
     )
     verb.add_argument("--truth", required=True, metavar="CLIP|FILE", help=text)
     verb.add_argument(
@@ -34,6 +33,7 @@ def add_validate(verbs: Verbs) -> None:
     text = "standard deviations of the reference's positions and orientations on each axis, which enter the intervals"
     verb.add_argument("--truth-noise", type=parse_pair, metavar="MM,DEG", help=text)
     add_pose_flags(verb)
+    add_pose_flags(verb, prefix=TRUTH_PREFIX)
     text = "unit file to write: that of --expect, or the preset, with what the reference showed; the page is beside it"
     add_unit_flags(verb, text)
 
@@ -41,28 +41,22 @@ def add_validate(verbs: Verbs) -> None:
 def run_validate(args: argparse.Namespace) -> Outcome:
     from harness.report.kit import render_text
     from harness.report.lab.validation_page import validation_page
-    from harness.stream.recording import CaptureReader
-    from harness.study.trust.capture_readings import read_capture
-    from harness.study.trust.logged_poses import readings_of_poses
+    from harness.study.trust.logged_poses import open_capture
     from harness.study.trust.truth_source import TruthSource, load_truth
     from harness.study.trust.validation import ValidationOptions, evaluate_registered, session_unit, validate_capture
 
     options = UnitOptions(args.out, args.expect, args.force)
-    source = TruthSource(args.truth, args.scenario, args.mocap)
+    with naming_truth_flags():
+        source = TruthSource(args.truth, args.scenario, args.mocap, pose_options(args, prefix=TRUTH_PREFIX))
     methods = split_list(args.methods)
     expected = read_expected(options)
     with ProgressBar("steps") as progress:
         progress("reading", 0, 3)
-        if holds_poses(args.capture):
-            capture = readings_of_poses(read_poses([args.capture], pose_options(args)))
-        else:
-            refuse_flags(
-                args, POSE_FLAGS, f"with {args.capture.name}", "It is for poses of another program: leave it out."
-            )
-            capture = read_capture(CaptureReader(args.capture))
+        capture = open_capture(args.capture, pose_options(args))
         if args.stations:
             capture = capture.only(split_list(args.stations))
-        truth = load_truth(capture, source)
+        with naming_truth_flags():
+            truth = load_truth(capture, source)
         if methods and truth.playback is None:
             advice = "Only a clip has a performer's body to score on: leave it out."
             raise BadInput(f"--methods with {truth.title}.", advice)

@@ -16,7 +16,7 @@ from harness.commands.flags import (
     refuse_flags,
 )
 from harness.commands.output import print_result, print_status
-from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, holds_poses, pose_options, read_poses
+from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, pose_options
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 
@@ -79,6 +79,7 @@ def run_view(args: argparse.Namespace) -> Outcome:
 
 def _open(args: argparse.Namespace) -> "ViewedMotion":
     from harness.commands.viewed_motion import open_motion, view_poses
+    from harness.study.trust.pose_source import holds_poses, read_poses
 
     methods = None if args.methods is None else parse_methods(args.methods)
     if holds_poses(Path(args.what)):

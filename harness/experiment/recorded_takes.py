@@ -7,9 +7,9 @@
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from harness.measure import Registration
 from harness.mocap import LibraryFolders
 from harness.score import WARM_UP_S, LoopFrames
 from harness.simulate import sampling_times_s
-from harness.stream import TrackerFrame
+from harness.stream import TrackerFrame, TrackerStream
 from harness.stream.polhemus.codec import STATION_CHARACTERS, DeviceSamples
 from harness.stream.recording import EXPECTED_FILE, RecordingStream
 
@@ -37,8 +37,21 @@ MIN_MATCHED_SHARE = 0.5
 """Smallest share of frames that match the motion; with fewer the recording is of another motion (our choice)."""
 
 
+class RecordedMotion(Protocol):
+    """What a recording or a pose log says of its origin."""
+
+    @property
+    def path(self) -> Path: ...
+    @property
+    def note(self) -> Mapping[str, Any]: ...
+    @property
+    def stations(self) -> tuple[str, ...]: ...
+    @property
+    def rate_hz(self) -> float: ...
+
+
 def find_playback(
-    stream: RecordingStream,
+    stream: RecordedMotion,
     *,
     scenario: str | None = None,
     names: Sequence[str] | None = None,
@@ -57,11 +70,11 @@ def find_playback(
     played = scenario or note.get("scenario")
     if played is None:
         raise BadInput(
-            f"Nothing says what {stream.recording.path} was played from.",
+            f"Nothing says what {stream.path} was played from.",
             "Only motion of a scenario has a truth: name it with --scenario, and --clip where it is not the first.",
         )
     shipped = load_scenario(played)
-    read_hz = stream.wire.rate_hz
+    read_hz = stream.rate_hz
     measured = abs(read_hz / shipped.tracker.rate_hz - 1.0) < RATE_TOLERANCE
     return prepare_playback(
         played,
@@ -78,18 +91,18 @@ def find_playback(
 _NOTE_TYPES = {"scenario": str, "clip": str, "noise": str, "rate_hz": float, "seed": int, "posing": bool}
 
 
-def checked_note(stream: RecordingStream) -> dict[str, Any]:
+def checked_note(stream: RecordedMotion) -> dict[str, Any]:
     """A recording's note without empty entries; BadFile when one that names the playback has another type."""
-    note = {name: value for name, value in stream.recording.note.items() if value is not None}
+    note = {name: value for name, value in stream.note.items() if value is not None}
     try:
         check_entries(note, {name: kind for name, kind in _NOTE_TYPES.items() if name in note}, "note")
     except (TypeError, HarnessError) as error:
-        raise BadFile(stream.recording.path, str(error), EXPECTED_FILE, "Name the scenario with --scenario.") from error
+        raise BadFile(stream.path, str(error), EXPECTED_FILE, "Name the scenario with --scenario.") from error
     return note
 
 
 def name_recorded_stations(
-    stream: RecordingStream, scenario: Path | str, names: Sequence[str] | None = None
+    stream: RecordedMotion, scenario: Path | str, names: Sequence[str] | None = None
 ) -> tuple[str, ...]:
     """Station names of a recording in a scenario: the given names, else the recorded ones.
 
@@ -107,7 +120,7 @@ def name_recorded_stations(
     return tuple(select_stations(known, stream.stations if has_station_names(stream, known) else count))
 
 
-def has_station_names(stream: RecordingStream, scenario: Scenario) -> bool:
+def has_station_names(stream: RecordedMotion, scenario: Scenario) -> bool:
     """Whether a recording names its stations, and not only by the device's characters."""
     named = not set("".join(stream.stations).encode()) <= set(STATION_CHARACTERS)
     return named or bool(set(stream.stations) & set(scenario.worn_stations))
@@ -134,7 +147,7 @@ def recorded_take(stream: RecordingStream, playback: Playback) -> ObservedTake:
 
 
 def registered_take(
-    stream: RecordingStream,
+    stream: TrackerStream,
     registration: Registration,
     playback: Playback,
     rate_hz: float,

@@ -169,6 +169,9 @@ class ErrorProcess:
 
     def whiten(self, values: Floats, valid: Bools, period_s: float) -> Floats:
         """Filter the columns (N, C) of one axis, sampled every `period_s` [s]; rows that are not valid become zero."""
+        if self.drift == 0.0:
+            out: Floats = np.where(valid[:, None], values, 0.0) / self.white
+            return out
         correlation = float(np.exp(-period_s / self.correlation_s))
         gain, deviation = kalman_gains(valid, correlation, self.drift**2, self.white**2)
         return whiten(np.ascontiguousarray(values), valid, gain, deviation, correlation)

@@ -1,7 +1,7 @@
 """Profile of a pose log: what the poses of another program show of their source without a reference."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from harness.measure.profile import (
     STATIC_CORRELATIONS,
     Bar,
     CollectedReadings,
-    StretchLength,
     UnitProfile,
     fit_rest,
     require_pair,
@@ -30,12 +29,14 @@ from harness.stream.recording import StationReadings
 _MOST_REPEATS = 0.5
 """Share of repeats from which on they show the resolution of a body at rest, and are kept [choice]."""
 _NO_REST = "No body rests for 5 s."
+_NO_MARKED_REST = "No body rests for 5 s in a stretch that is marked static, or not marked."
 _NO_HOST = "A file of poses has no clock of a host."
 _EVEN = "All steps are equal, and do not show it."
 
 
 def measure_log_profile(
     log: PoseLog,
+    marks: Sequence[tuple[float, str]] = (),
     *,
     bar: Bar | None = None,
     progress: ProgressCallback = lambda step, done, planned: None,
@@ -43,6 +44,7 @@ def measure_log_profile(
     """Measure the source of a pose log, at rest or moving.
 
     Noise and episodes are those of rests, at an even rate. A moving body shows its timing, and a bound of its noise.
+    `marks` are the times [s] at which stretches begin, and their names; rests count as in a device's capture.
     BadInput for bodies of `bar` that are not in it, and without a body of 20 poses.
     """
     require_pair(bar, log.names)
@@ -55,22 +57,27 @@ def measure_log_profile(
     counted = log.clock if log.is_counted else ""
     rate_hz = round(1.0 / mean_period_s([body.times_s for body in bodies]), 3)
     collected = CollectedReadings(rate_hz, bar)
-    for name, even in series.items():
-        for part in even.parts:
-            collected.add_rest(name, part, even.rate_hz)
-    if bar:
-        collected.add_motion({body.name: _raw(body, kept[body.name]) for body in bodies})
+    raw = {body.name: StationReadings.of_body(body).select(kept[body.name]) for body in bodies}
+    begins_s = np.array([0.0, *(at_s for at_s, _ in marks)])
+    ends_s = np.append(begins_s[1:], np.inf)
+    for begin_s, end_s, stretch in zip(begins_s, ends_s, ["", *(name for _, name in marks)], strict=True):
+        if records := sum(int(np.sum((b.times_s >= begin_s) & (b.times_s < end_s))) for b in bodies):
+            collected.add_length(stretch, min(end_s, log.duration_s) - begin_s, records)
+        collected.add_motion(stretch, {name: _between(one, begin_s, end_s) for name, one in raw.items()})
+        for name, even in series.items():
+            for part in even.parts:
+                collected.add_rest(stretch, name, _between(part, begin_s, end_s), even.rate_hz)
     unseen = [body.name for body in log.bodies if body not in bodies]
     notes = [f"{name}: fewer than {FEWEST_POSES} poses, not measured." for name in unseen]
     for body in bodies:
         notes += _describe(body, kept[body.name], series[body.name], counted)
-    noise, episodes = _fit(collected, notes, progress)
+    noise, episodes = _fit(collected, _NO_MARKED_REST if marks else _NO_REST, notes, progress)
     return UnitProfile(
         tuple(body.name for body in bodies),
         rate_hz,
         (),
         {"source": "poses"},
-        (StretchLength("", log.duration_s, sum(len(body.times_s) for body in bodies)),),
+        collected.stretches(),
         (),
         0,
         _timing(bodies, repeats, log.start_unix_s or 0.0, f"The source has no times: {counted}." if counted else ""),
@@ -83,9 +90,10 @@ def measure_log_profile(
     )
 
 
-def _fit(collected: CollectedReadings, notes: list[str], progress: ProgressCallback) -> tuple[NoiseFit, EpisodeFit]:
-    """Noise and episodes of the rests; missing without one, and where rests are too short for the correlation."""
-    reason = _NO_REST
+def _fit(
+    collected: CollectedReadings, reason: str, notes: list[str], progress: ProgressCallback
+) -> tuple[NoiseFit, EpisodeFit]:
+    """Noise and episodes of the rests; missing without one for a reason, and where rests are too short."""
     if collected.rest:
         try:
             noise, episodes = fit_rest(collected.rest, progress)
@@ -103,12 +111,8 @@ def _fit(collected: CollectedReadings, notes: list[str], progress: ProgressCallb
     return without_rest(reason)
 
 
-def _raw(body: BodyPoses, kept: Bools) -> StationReadings:
-    time_s = body.times_s[kept]
-    count = len(time_s)
-    return StationReadings(
-        time_s, time_s, time_s, body.positions_m[kept], body.quaternions[kept], np.ones(count), np.zeros(count, bool)
-    )
+def _between(readings: StationReadings, begin_s: float, end_s: float) -> StationReadings:
+    return readings.select((readings.measured_s >= begin_s) & (readings.measured_s < end_s))
 
 
 def _describe(body: BodyPoses, kept: Bools, series: EvenSeries, counted: str) -> list[str]:

@@ -102,14 +102,17 @@ class TruthSpline:
         quaternion = values[:, 3:]
         return values[:, :3], quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
 
-    def rates(self, time_s: Floats) -> tuple[Floats, Floats]:
-        """Velocities (N, 3) in the world [m/s] and angular velocities (N, 3) in the body's axes [rad/s]."""
+    def motion(self, time_s: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Positions [m], `world_from_body` (N, 4), velocities [m/s] and angular velocities in the body's axes [rad/s].
+
+        All but the quaternions are (N, 3), in the world's axes.
+        """
         values, slopes = self._spline(time_s), self._slope(time_s)
-        raw = values[:, 3:]
-        squared = np.sum(raw**2, axis=1, keepdims=True)
+        length = np.linalg.norm(values[:, 3:], axis=1, keepdims=True)
+        turn = values[:, 3:] / length
         # The slope along the quaternion changes its length only; conj(q) q' has it in the scalar part.
-        turn = 2.0 * rotations.multiply(rotations.inverse(raw), slopes[:, 3:])[:, 1:] / squared
-        return slopes[:, :3], turn
+        omega = 2.0 * rotations.multiply(rotations.inverse(turn), slopes[:, 3:])[:, 1:] / length
+        return values[:, :3], turn, slopes[:, :3], omega
 
 
 def require_pairs(

@@ -200,29 +200,34 @@ class CollectedReadings:
 
     def add(self, stretch: str, stations: Mapping[str, StationReadings]) -> None:
         """Add readings of a stretch of this name, whose records come at the rate."""
-        length, records = self._stretches.setdefault(stretch, [0.0, 0.0]), sum(map(len, stations.values()))
         times_s = [readings.received_s for readings in stations.values() if len(readings)]
-        if times_s:
-            length[0] += max(float(t[-1]) for t in times_s) - min(float(t[0]) for t in times_s)
-        length[1] += records
+        duration_s = max(float(t[-1]) for t in times_s) - min(float(t[0]) for t in times_s) if times_s else 0.0
+        self.add_length(stretch, duration_s, sum(map(len, stations.values())))
         if not stations:
             return
-        for station, readings in stations.items() if stretch in (*REST_STRETCHES, _COVERED) else ():
-            self.add_rest(station, readings, self._rate_hz, stretch)
-        if self._bar and stretch not in ("static", _COVERED) and self._moved < MOST_REST_SAMPLES:
-            self._moved += records
-            self.add_motion(stations)
+        for station, readings in stations.items():
+            self.add_rest(stretch, station, readings, self._rate_hz)
+        self.add_motion(stretch, stations)
 
-    def add_rest(self, station: str, readings: StationReadings, rate_hz: float, stretch: str = "") -> None:
+    def add_length(self, stretch: str, duration_s: float, records: int) -> None:
+        """Count the time and the records of a stretch."""
+        length = self._stretches.setdefault(stretch, [0.0, 0.0])
+        length[0] += duration_s
+        length[1] += records
+
+    def add_rest(self, stretch: str, station: str, readings: StationReadings, rate_hz: float) -> None:
         """Keep the rests of a station whose records come at an even rate."""
+        if stretch not in (*REST_STRETCHES, _COVERED):
+            return
         for rest in find_rest(readings, rate_hz).tolist():
             kept = self.covered if stretch == _COVERED else self.rest
             self._keep(kept, static_series(readings, (rest[0], rest[1]), rate_hz, station))
             self.places.append(_rest_place(station, readings, slice(rest[0], rest[1])))
 
-    def add_motion(self, stations: Mapping[str, StationReadings]) -> None:
+    def add_motion(self, stretch: str, stations: Mapping[str, StationReadings]) -> None:
         """Keep the two stations on a bar; their records need no even rate."""
-        if self._bar:
+        if self._bar and stretch not in ("static", _COVERED) and self._moved < MOST_REST_SAMPLES:
+            self._moved += sum(map(len, stations.values()))
             first, second = self._bar.stations
             self._motion.append((stations[first], stations[second]))
 

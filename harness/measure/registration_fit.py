@@ -6,7 +6,8 @@ time longer than five correlation times scatter more than it says, it is enlarge
 
 The noise of an unknown source need not be of that kind. Plain least squares then weigh all readings alike, and only
 those far from all others are left out. Orientations alone give rotations, time offset and clock; positions give the
-rest. The covariance is the scatter of blocks.
+rest. The covariance is the scatter of blocks, whose residuals are smaller than their errors where a block pulls the fit
+to itself: by its leverage (Bell and McCaffrey 2002, bias reduced linearization).
 """
 
 import math
@@ -16,7 +17,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats, find_runs
+from harness.core.arrays import Bools, Floats, Ints, find_runs
 from harness.core.number_format import NORMAL_QUANTILE
 from harness.measure.gauss_markov import ErrorProcess, fit_process
 from harness.measure.pose_series import TruthSpline
@@ -34,6 +35,10 @@ _CHI_MEDIAN = 1.538
 """Median length of a vector of three standard normal numbers."""
 _REFITS = 3
 """Steps of generalised least squares, which is nearly linear."""
+_LOOSE_ROWS = 20_000
+"""About the most readings of a station for the first fit, which is only a start."""
+_LEAST_REST = 0.01
+"""Least share of a block's errors that is taken to be left in its residuals."""
 _LONG_S, _AROUND_S = 0.4, 0.3
 """A run of outliers of this length is an excursion, whose ends are hidden in noise for this time [s]."""
 
@@ -92,23 +97,20 @@ def fit_registration(
         used = [_agreeing(r, g, PLAIN_OUTLIER if plain else OUTLIER) for r, g in zip(residuals, grids, strict=True)]
         noise = [_fit_noise(r, u, g.period_s) for r, u, g in zip(residuals, used, grids, strict=True)]
         for _ in range(_REFITS):
-            step, sums = _whitened_step(state, grids, truths, used, noise, fixed, plain)
+            step, sums = _whitened_step(state, grids, truths, used, noise, fixed, plain, by_block=True)
             state = state.moved(step)
-    covariance = (
-        _plain_covariance(sums, fixed) if plain else _covariance(sums.information, sums.meat, sums.blocks, fixed)
-    )
-    blocks = sums.blocks
+    covariance = _plain_covariance(sums, fixed) if plain else _covariance(sums.information, sums.meat, fixed)
     if plain and CLOCK not in fixed:
         state, covariance = _move_reference(state, covariance, sums.information, fixed)
     residuals = refit_residuals(state, grids, truths)
-    return FittedRegistration(state, covariance, blocks, residuals, tuple(used), tuple(noise))
+    return FittedRegistration(state, covariance, sums.count, residuals, tuple(used), tuple(noise))
 
 
 def refit_residuals(
     state: RegistrationState, grids: Sequence[StationGrid], truths: Sequence[TruthSpline]
 ) -> tuple[Floats, ...]:
     """(N, 6) residuals of each station under a state: position [m] and rotation vector [rad]."""
-    return tuple(_linear(state, s, grids, truths)[0] for s in range(len(grids)))
+    return tuple(_spread(_linear(state, s, grids, truths)[0], grid.known) for s, grid in enumerate(grids))
 
 
 def refit_steps(
@@ -130,14 +132,25 @@ def refit_steps(
 def _linear(
     state: RegistrationState, s: int, grids: Sequence[StationGrid], truths: Sequence[TruthSpline]
 ) -> tuple[Floats, Floats]:
-    """Residuals (N, 6) and slopes (N, 6, 17) of one station; zero where nothing is known."""
-    grid, truth = grids[s], truths[s]
+    """Residuals (K, 6) and slopes (K, 6, 17) of the K known readings of one station."""
+    grid = grids[s]
     rows = grid.known
-    residual, slope = np.zeros((len(rows), 6)), np.zeros((len(rows), 6, SHARED + OWN))
-    residual[rows], slope[rows] = linearise(
-        state, s, grid.measured_s[rows], grid.position_m[rows], grid.turn[rows], truth
-    )
-    return residual, slope
+    return linearise(state, s, grid.measured_s[rows], grid.position_m[rows], grid.turn[rows], truths[s])
+
+
+def _spread(values: Floats, known: Bools) -> Floats:
+    """Values (K, ...) at the known places of a grid; zero elsewhere."""
+    out = np.zeros((len(known), *values.shape[1:]))
+    out[known] = values
+    return out
+
+
+def _thinned(grid: StationGrid) -> StationGrid:
+    """A grid with some of its readings, evenly."""
+    kept = np.zeros_like(grid.known)
+    rows = np.flatnonzero(grid.known)
+    kept[rows[:: max(len(rows) // _LOOSE_ROWS, 1)]] = True
+    return replace(grid, known=kept)
 
 
 def _columns(s: int) -> list[int]:
@@ -149,16 +162,16 @@ def _fit_loosely(
     grids: Sequence[StationGrid], truths: Sequence[TruthSpline], state: RegistrationState, fixed: Sequence[int]
 ) -> RegistrationState:
     """Iteratively reweighted least squares with Tukey's weights, as if all records were independent."""
-    size = SHARED + OWN * len(grids)
+    size, grids = SHARED + OWN * len(grids), [_thinned(grid) for grid in grids]
     for _ in range(12):
         information, score = np.zeros((size, size)), np.zeros(size)
-        for s, grid in enumerate(grids):
+        for s in range(len(grids)):
             residual, slope = _linear(state, s, grids, truths)
             for part in (slice(0, 3), slice(3, 6)):
                 length = np.linalg.norm(residual[:, part], axis=1)
-                deviation = max(float(np.median(length[grid.known])) / _CHI_MEDIAN, 1e-9)
+                deviation = max(float(np.median(length)) / _CHI_MEDIAN, 1e-9)
                 share = np.minimum(length / (6.0 * deviation), 1.0)
-                weight = np.where(grid.known, (1.0 - share**2) ** 2, 0.0) / deviation**2
+                weight = (1.0 - share**2) ** 2 / deviation**2
                 rows = slope[:, part].reshape(-1, SHARED + OWN)
                 weighted = rows * np.repeat(weight, 3)[:, None]
                 place = np.ix_(_columns(s), _columns(s))
@@ -202,16 +215,36 @@ def _fit_noise(residual: Floats, used: Bools, period_s: float) -> StationNoise:
 
 
 @dataclass(frozen=True, eq=False)
+class _Block:
+    """One block of time of one station, of whose parameters `columns` are the places."""
+
+    columns: list[int]
+    information: Floats
+    """(17, 17)"""
+    score: Floats
+    """(17,) gradient of the squared errors."""
+
+
+@dataclass(frozen=True, eq=False)
 class _NormalSums:
     """Sums of least squares over all stations, P parameters."""
 
     information: Floats
     """(P, P) of the parameters that a reading is used for."""
-    coupling: Floats
-    """(P, P) the same with the slopes of positions by rotations and clocks, which plain least squares do not use."""
-    meat: Floats
-    """(P, P) scatter of the gradients of blocks."""
-    blocks: int
+    whole: Floats
+    """(P, P) derivative of the score: for plain least squares with the slopes of positions by rotations and clocks."""
+    blocks: tuple[_Block, ...]
+    count: int
+    """Number of blocks of time."""
+
+    @property
+    def meat(self) -> Floats:
+        """(P, P) scatter of the gradients of blocks."""
+        scores = np.zeros((len(self.blocks), len(self.information)))
+        for row, block in zip(scores, self.blocks, strict=True):
+            row[block.columns] = block.score
+        out: Floats = scores.T @ scores * self.count / max(self.count - 1, 1)
+        return out
 
 
 def _whitened_step(
@@ -222,18 +255,23 @@ def _whitened_step(
     noise: Sequence[StationNoise],
     fixed: Sequence[int],
     plain: bool = False,
+    *,
+    by_block: bool = False,
 ) -> tuple[Floats, _NormalSums]:
-    """One step of least squares, and its sums."""
+    """One step of least squares, and its sums; without `by_block` those of blocks are left out."""
     size = SHARED + OWN * len(grids)
-    information, coupling, score, scores = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size), []
+    information, whole, score = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
+    blocks, counts = list[_Block](), list[int]()
     for s, grid in enumerate(grids):
         residual, slope = _linear(state, s, grids, truths)
-        longest_s = max(process.correlation_s for process in noise[s])
-        block_rows = max(min(round(BLOCK_CORRELATIONS * longest_s / grid.period_s), len(residual) // FEWEST_BLOCKS), 1)
-        gradient, mine = np.zeros((len(residual), SHARED + OWN)), np.ix_(_columns(s), _columns(s))
+        places = np.flatnonzero(grid.known)
+        if not plain:  # correlated noise needs every place of the grid
+            residual, slope = _spread(residual, grid.known), _spread(slope, grid.known)
+            places = np.arange(len(grid.known))
+        own, rests, mine = list[Floats](), list[Floats](), np.ix_(_columns(s), _columns(s))
         weights = _alike(noise[s]) if plain else noise[s]
         for process, axes in zip(weights, _AXES, strict=True):
-            valid = used[s][:, int(axes[0] >= 3)]
+            valid = used[s][places, int(axes[0] >= 3)]
             for axis in axes:
                 values = np.concatenate([slope[:, axis], residual[:, axis, None]], axis=1)
                 white = process.whiten(values, valid, grid.period_s)
@@ -242,18 +280,28 @@ def _whitened_step(
                 if plain and axis < 3:
                     chosen = rows.copy()
                     chosen[:, _BY_ORIENTATIONS] = 0.0
-                    coupling[mine] += chosen.T @ rows
                 information[mine] += chosen.T @ chosen
-                gradient += chosen * errors[:, None]
-        score[_columns(s)] += gradient.sum(axis=0)
-        edges = np.arange(0, len(gradient), block_rows)
-        sums = np.zeros((len(edges), size))
-        sums[:, _columns(s)] = np.add.reduceat(gradient, edges, axis=0)
-        scores.append(sums)
-    blocks = min(len(sums) for sums in scores)
-    centred = np.concatenate(scores)
-    meat = centred.T @ centred * blocks / max(blocks - 1, 1)
-    return _solve(information, score, fixed), _NormalSums(information, coupling, meat, blocks)
+                whole[mine] += chosen.T @ rows
+                score[_columns(s)] += chosen.T @ errors
+                if by_block:
+                    own.append(chosen)
+                    rests.append(errors)
+        if by_block:
+            parts = _block_parts(grid, places, noise[s])
+            slopes, errors = np.stack(own, axis=1), np.stack(rests, axis=1)
+            for part in parts:
+                rows = slopes[part].reshape(-1, SHARED + OWN)
+                blocks.append(_Block(_columns(s), rows.T @ rows, rows.T @ errors[part].reshape(-1)))
+            counts.append(len(parts))
+    return _solve(whole, score, fixed), _NormalSums(information, whole, tuple(blocks), min(counts, default=0))
+
+
+def _block_parts(grid: StationGrid, places: Ints, noise: StationNoise) -> list[slice]:
+    """Rows of each block of time of one station, whose rows have these places (K,) of a grid."""
+    longest_s, total = max(process.correlation_s for process in noise), len(grid.known)
+    length = max(min(round(BLOCK_CORRELATIONS * longest_s / grid.period_s), total // FEWEST_BLOCKS), 1)
+    edges = np.searchsorted(places, np.arange(0, total, length)).tolist()
+    return [slice(begin, end) for begin, end in zip(edges, [*edges[1:], len(places)], strict=True)]
 
 
 def _alike(noise: StationNoise) -> StationNoise:
@@ -290,18 +338,37 @@ def _plain_covariance(sums: _NormalSums, fixed: Sequence[int]) -> Floats:
     from scipy import special
 
     free = _free(len(sums.information), fixed)
-    inside, shown = np.ix_(free, free), np.zeros_like(sums.information)
-    whole = sums.information.copy()
-    cross = np.ix_([i for i in range(len(whole)) if i not in _BY_ORIENTATIONS], _BY_ORIENTATIONS)
-    whole[cross] += sums.coupling[cross]
-    scale = np.sqrt(np.maximum(np.diag(sums.information)[free], 1e-300))
-    inverse = np.linalg.pinv(whole[inside] / scale[:, None] / scale, rcond=1e-13) / scale[:, None] / scale
-    sandwich = inverse @ sums.meat[inside] @ inverse.T
-    least = np.diag(_covariance(sums.information, np.zeros_like(whole), sums.blocks, fixed))[free]
+    inverse, alone = _inverse(sums.whole, free), _inverse(sums.information, free)
+    moves = np.array([inverse[:, block.columns] @ _corrected_score(block, alone, fixed) for block in sums.blocks])
+    sandwich = moves.T @ moves
+    least = np.diag(_covariance(sums.information, np.zeros_like(inverse), fixed))
     factor = np.sqrt(np.maximum(least / np.maximum(np.diag(sandwich), 1e-300), 1.0))
-    student = float(special.stdtrit(max(sums.blocks - 1, 1), 0.975)) / NORMAL_QUANTILE
-    shown[inside] = sandwich * factor[:, None] * factor * student**2
-    return shown
+    student = float(special.stdtrit(max(sums.count - 1, 1), 0.975)) / NORMAL_QUANTILE
+    out: Floats = sandwich * factor[:, None] * factor * student**2
+    return out
+
+
+def _inverse(matrix: Floats, free: Sequence[int]) -> Floats:
+    """Pseudoinverse of the rows and columns of free parameters; zero elsewhere."""
+    inside, out = np.ix_(free, free), np.zeros_like(matrix)
+    scale = np.sqrt(np.maximum(np.diag(matrix)[free], 1e-300))
+    out[inside] = np.linalg.pinv(matrix[inside] / scale[:, None] / scale, rcond=1e-12) / scale[:, None] / scale
+    return out
+
+
+def _corrected_score(block: _Block, inverse: Floats, fixed: Sequence[int]) -> Floats:
+    """(17,) score of a block without the share of its errors that the fit took to itself.
+
+    With independent errors of equal size the scatter of such scores has no bias.
+    """
+    rows = [row for row, column in enumerate(block.columns) if column not in fixed]
+    columns = [block.columns[row] for row in rows]
+    variance, axes = np.linalg.eigh(inverse[np.ix_(columns, columns)])
+    root = axes * np.sqrt(np.maximum(variance, 1e-15 * variance[-1]))
+    leverage, turn = np.linalg.eigh(root.T @ block.information[np.ix_(rows, rows)] @ root)
+    base, out = root @ turn, block.score.copy()
+    out[rows] = np.linalg.solve(base.T, base.T @ out[rows] / np.sqrt(np.maximum(1.0 - leverage, _LEAST_REST)))
+    return out
 
 
 def _free(size: int, fixed: Sequence[int]) -> list[int]:
@@ -310,15 +377,11 @@ def _free(size: int, fixed: Sequence[int]) -> list[int]:
 
 def _solve(information: Floats, score: Floats, fixed: Sequence[int]) -> Floats:
     """Solution of the normal equations; parameters without information, and fixed ones, do not move."""
-    free = _free(len(score), fixed)
-    out = np.zeros(len(score))
-    scale = np.sqrt(np.maximum(np.diag(information)[free], 1e-300))
-    scaled = information[np.ix_(free, free)] / scale[:, None] / scale
-    out[free] = np.linalg.lstsq(scaled, score[free] / scale, rcond=1e-12)[0] / scale
+    out: Floats = _inverse(information, _free(len(score), fixed)) @ score
     return out
 
 
-def _covariance(information: Floats, meat: Floats, blocks: int, fixed: Sequence[int]) -> Floats:
+def _covariance(information: Floats, meat: Floats, fixed: Sequence[int]) -> Floats:
     """Inverse of the information, enlarged where blocks scatter more; fixed parameters have none."""
     free = _free(len(information), fixed)
     inside = np.ix_(free, free)

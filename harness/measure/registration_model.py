@@ -91,13 +91,11 @@ def linearise(
 
     time_s = state.truth_time_s(measured_s)
     since_s = (time_s - state.reference_s)[:, None]
-    (_, body), (_, omega) = truth.poses(time_s), truth.rates(time_s)
-
     factor = 1.0 + state.scale
-    at_m, velocity = _station_point(state, mount_m, time_s, truth)
-    ahead, behind = (_station_point(state, mount_m, time_s + step_s, truth)[1] for step_s in (_STEP_S, -_STEP_S))
+    body_m, body, omega, velocity = _station_motion(mount_m, time_s, truth)
+    ahead, behind = (_station_motion(mount_m, time_s + step_s, truth)[3] for step_s in (_STEP_S, -_STEP_S))
     acceleration = (ahead - behind) / (2.0 * _STEP_S)
-    at_m = at_m + state.ahead_s * velocity
+    at_m = body_m + rotations.rotate(body, mount_m) - state.tracker_origin_m + state.ahead_s * velocity
     arm = rotations.to_matrix(body) + state.ahead_s * rotations.to_matrix(body) @ rotations.cross_matrix(omega)
     in_room = rotations.rotate(room, at_m)
     by_time = factor * rotations.rotate(room, velocity + state.ahead_s * acceleration)
@@ -123,13 +121,10 @@ def linearise(
     return residual, slope
 
 
-def _station_point(
-    state: RegistrationState, mount_m: Floats, time_s: Floats, truth: TruthSpline
-) -> tuple[Floats, Floats]:
-    """Position of a station relative to the tracker's origin (N, 3) [m] and its velocity (N, 3) [m/s], world axes."""
-    (body_m, body), (velocity, omega) = truth.poses(time_s), truth.rates(time_s)
-    at_m = body_m + rotations.rotate(body, mount_m) - state.tracker_origin_m
-    return at_m, velocity + rotations.rotate(body, rotations.cross(omega, mount_m))
+def _station_motion(mount_m: Floats, time_s: Floats, truth: TruthSpline) -> tuple[Floats, Floats, Floats, Floats]:
+    """Position, quaternion and angular velocity of the body, and velocity of the station (N, 3) in world axes [m/s]."""
+    body_m, body, velocity, omega = truth.motion(time_s)
+    return body_m, body, omega, velocity + rotations.rotate(body, rotations.cross(omega, mount_m))
 
 
 def _unit(quaternion: Floats) -> Floats:

@@ -121,7 +121,7 @@ class TimingAccumulator:
         counts = self._counts.setdefault(station, _StationCounts())
         if not len(readings):
             return
-        joined = readings if counts.last is None else _append(counts.last, readings)
+        joined = readings if counts.last is None else StationReadings.join([counts.last, readings])
         repeated = _repeats(joined)
         counts.records += len(readings)
         counts.duplicates += int(repeated.sum())
@@ -136,7 +136,7 @@ class TimingAccumulator:
         counts.squares_s2 += float(np.sum(single**2))
         counts.deviations_s += float(single.sum())
         counts.singles += len(single)
-        counts.last = _row(readings, -1)
+        counts.last = readings.select(slice(-1, None))
 
     def _add_clocks(self, block: CaptureBlock, station: str, readings: StationReadings) -> None:
         known = np.isfinite(readings.measured_s)
@@ -226,16 +226,6 @@ def _repeats(readings: StationReadings) -> Bools:
             same &= equal.all(axis=1)
         out[1:] = same
     return out
-
-
-def _row(readings: StationReadings, row: int) -> StationReadings:
-    rows = slice(row, row + 1 or None)
-    return StationReadings(*(getattr(readings, name)[rows] for name in StationReadings.__dataclass_fields__))
-
-
-def _append(first: StationReadings, second: StationReadings) -> StationReadings:
-    names = StationReadings.__dataclass_fields__
-    return StationReadings(*(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names))
 
 
 def _merge(counts: Mapping[str, _StationCounts]) -> _StationCounts:

@@ -27,7 +27,13 @@ def test_two_files_of_one_body_are_validated(pair: tuple[Path, Path], tmp_path: 
     assert "--least-matched" in refused.err
     words = ("validate", capture, "--truth", truth, "--least-matched", "0.6", "--out", tmp_path / "unit.toml")
     said = command(*words)
-    for text in ("scale error", "Poses of both are body-from-world and were inverted", "% of the variance", "unevenly"):
+    for text in (
+        "scale error",
+        "Times of a file of poses count from",
+        "Poses of both are body-from-world and were inverted",
+        "% of the variance",
+        "unevenly",
+    ):
         assert text in said.out
     found = command("validate", capture, "--truth", truth, "--least-matched", "0.6", "--json").content
     (late_ms,) = re.findall(r"Unix times the capture is ([\d,.]+) ms late", said.out.replace("\n  ", " "))
@@ -36,6 +42,27 @@ def test_two_files_of_one_body_are_validated(pair: tuple[Path, Path], tmp_path: 
     assert 0.7 < found["matched_share"] < 0.85
     assert min(found["explained"]["phone"].values()) > 0.98
     assert "unit.toml" in said.out
+
+
+def test_options_of_the_reference_override_its_evidence(
+    pair: tuple[Path, Path], tmp_path: Path, command: Command
+) -> None:
+    """The reference without its header, in inches."""
+    rows = np.loadtxt(pair[1], delimiter=",", skiprows=1)
+    rows[:, 1:4] /= 0.0254
+    np.savetxt(tmp_path / "bare.txt", rows, fmt="%.9f")
+    known = "--truth-columns", "time,x,y,z,qx,qy,qz,qw", "--truth-unit", "in", "--least-matched", "0.6", "--json"
+    said = [
+        command("validate", pair[0], "--truth", truth, *words).content["numbers"]["scale"]["value"]
+        for truth, words in ((pair[1], known[4:]), (tmp_path / "bare.txt", known))
+    ]
+    assert said[0] == pytest.approx(said[1], abs=1e-6)
+    refused = command("validate", pair[0], "--truth", tmp_path / "bare.txt", "--least-matched", "0.6", code=2).err
+    assert "Assumed without evidence: length unit of bare.txt: " in refused
+    assert "(--truth-unit)" in refused
+    assert "--truth-up 'w'" in command("validate", pair[0], "--truth", pair[1], "--truth-up", "w", code=2).err
+    np.savetxt(tmp_path / "untimed.txt", rows[:, 1:], fmt="%.9f")
+    assert "--truth-rate HZ" in command("validate", pair[0], "--truth", tmp_path / "untimed.txt", code=2).err
 
 
 def test_noise_of_the_reference_widens_the_intervals(pair: tuple[Path, Path], command: Command) -> None:

@@ -173,7 +173,7 @@ def test_markers_of_a_cluster_are_a_body(folder: Path, command: Command) -> None
     assert "body bar: 3 markers that fit a rigid body to" in said.out
     body = open_poses([Path("bar.rec")]).log.body("bar")
     np.testing.assert_allclose(body.positions_m[-1] - body.positions_m[0], [0.4, 0.0, 0.0], atol=1e-4)
-    assert "A C3D file takes --unit alone" in command("record", "bar.c3d", "b.rec", "--up", "y", code=2).err
+    assert "A C3D file takes the unit alone" in command("record", "bar.c3d", "b.rec", "--up", "y", code=2).err
     assert "no three markers of one body" in command("replay", write_markers(folder), code=2).err
 
 

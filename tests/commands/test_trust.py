@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.command import Command
-from tests.study.trust.conftest import SmallStudy, small_study
+from tests.study.trust.conftest import SmallStudy, small_study, write_log
 
 __all__ = ["small_study"]
 pytestmark = pytest.mark.long
@@ -45,3 +45,15 @@ def test_a_plan_without_margins_is_refused(small_study: SmallStudy, tmp_path: Pa
     plan = tmp_path / "plan.toml"
     plan.write_text('kind = "trust plan"\nscenario = "demo"\nmethods = ["ik"]\n', encoding="utf-8")
     assert "no margins" in command("trust", plan, small_study.captures[0], code=2).err
+
+
+def test_poses_of_another_program_are_captures(small_study: SmallStudy, tmp_path: Path, command: Command) -> None:
+    """Three seconds do not suffice to register them; the plan is accepted before."""
+    poses, kept = write_log(small_study.captures[2], tmp_path / "poses.csv"), tmp_path / "poses.rec"
+    words = "--truth", "boxing_p1_01", "--out", tmp_path / "out"
+    assert "poses.csv names no plan" in command("trust", small_study.plan, poses, *words, code=3).err
+    command("record", poses, kept, "--plan", small_study.plan)
+    assert "overlap by at most" in command("trust", small_study.plan, kept, *words, code=3).err
+    told = command("trust", small_study.plan, kept, "--truth", poses, *words[2:], code=2).err
+    assert "no performer's motion" in told
+    assert f"harness validate {kept} --truth {poses} --expect UNIT.toml" in told

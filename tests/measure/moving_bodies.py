@@ -68,7 +68,7 @@ def report_poses(
     for name, (mount_m, mount) in mounts.items():
         spline = TruthSpline(truths[name])
         time_s = np.arange(spline.time_s[0] + 0.003, spline.time_s[-1] - 0.003, 1.0 / tracker.rate_hz)
-        (body_m, body), (velocity, omega) = spline.poses(time_s), spline.rates(time_s)
+        body_m, body, velocity, omega = spline.motion(time_s)
         velocity = velocity + rotations.rotate(body, np.cross(omega, mount_m))
         at_m = body_m + rotations.rotate(body, mount_m) - tracker.origin_m + tracker.ahead_s * velocity
         position_m = (1.0 + tracker.scale) * rotations.rotate(tracker.room, at_m)

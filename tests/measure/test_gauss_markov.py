@@ -106,3 +106,10 @@ def test_fit_finds_the_process(white: float, drift: float, correlation_s: float,
     assert found.white == pytest.approx(white, rel=0.05)
     assert found.drift == pytest.approx(drift, rel=0.1)
     assert found.correlation_s == pytest.approx(correlation_s, rel=0.15)
+
+
+def test_without_drift_whitening_is_that_of_the_filter(rng: np.random.Generator) -> None:
+    values, used = rng.normal(size=(50, 3)), rng.random(50) < 0.8
+    gain, deviation = kalman_gains(used, 0.9, 0.0, 0.49)
+    expected = whiten(np.where(used[:, None], values, 0.0), used, gain, deviation, 0.9)
+    np.testing.assert_allclose(ErrorProcess(0.7, 0.0, 1.0).whiten(values, used, 0.1), expected, rtol=1e-14)

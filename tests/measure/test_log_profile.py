@@ -64,6 +64,23 @@ def test_noise_at_rest_is_that_which_was_planted(rng: np.random.Generator) -> No
     assert "noise at rest is that of the nearest poses at an even" in said
 
 
+def test_marks_say_where_rests_and_motion_count(rng: np.random.Generator) -> None:
+    """A hand holds the body for 40 of 100 s; only the others are rests, and the covered ones are apart."""
+    body = resting(rng, 100.0)
+    held = (body.times_s > 40.0) & (body.times_s < 80.0)
+    place = body.positions_m + np.where(held, 0.004, 0.0)[:, None] * rng.normal(size=body.positions_m.shape)
+    log = log_of(replace(body, positions_m=place))
+    marks = [(0.0, "static"), (40.0, "slow"), (80.0, "static"), (110.0, "covered")]
+    found = measure_log_profile(log, marks)
+    assert found.noise.all_stations["components.white.position_m"].value == pytest.approx(WHITE_M, rel=0.15)
+    lengths = {one.name: one.duration_s for one in found.stretches}
+    assert lengths == pytest.approx({"static": 70.0, "slow": 40.0, "covered": log.duration_s - 110.0})
+    assert sum(one.records for one in found.stretches) == len(body.times_s)
+    assert max(one.duration_s for one in found.rest) < 41.0
+    missing = measure_log_profile(log, [(0.0, "slow")]).noise.all_stations["components.white.position_m"]
+    assert missing.reason == "No body rests for 5 s in a stretch that is marked static, or not marked."
+
+
 def test_an_even_series_takes_the_nearest_pose_and_leaves_few_holes(rng: np.random.Generator) -> None:
     body = resting(rng, 60.0)
     found = even_series(body, np.ones(len(body.times_s), bool))

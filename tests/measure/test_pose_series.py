@@ -26,7 +26,7 @@ def test_between_its_poses_a_reference_is_smooth() -> None:
     place, turn = spline.poses(middle_s)
     np.testing.assert_allclose(place, expected.position_m, atol=1e-6)
     assert rotations.angle_between_rad(turn, expected.world_from_body).max() < 2e-5
-    velocity, omega = spline.rates(middle_s)
+    _, _, velocity, omega = spline.motion(middle_s)
     angle = 2.0 * np.pi * middle_s
     np.testing.assert_allclose(velocity[:, 0], -0.6 * np.pi * np.sin(angle), atol=1e-3)
     axis = np.array([0.0, 0.6, 0.8])

@@ -150,7 +150,7 @@ def _spread(pair: ComparedPair) -> list[BenchmarkStatement]:
     used, state = errors.valid & errors.used[:, 0], registration.state
     spline = TruthSpline(pair.truth)
     body_m, body = spline.poses(errors.truth_s[used])
-    velocity, _ = spline.rates(errors.truth_s[used])
+    velocity = spline.motion(errors.truth_s[used])[2]
     expected_m = body_m + state.ahead_s * velocity + rotations.rotate(body, state.mount_m[0])
     modelled_m = (1.0 + state.scale) * rotations.rotate(state.tracker_from_world, expected_m - state.tracker_origin_m)
     scale, rms_m = references.evo_alignment(modelled_m + errors.position_m[used], expected_m)

@@ -172,4 +172,5 @@ def error_quantiles(error: Floats, valid: Bools, period_s: float) -> ErrorQuanti
 
 
 def _summary(size: Floats) -> tuple[float, float, float]:
-    return float(np.sqrt(np.mean(size**2))), float(np.median(size)), float(np.quantile(size, 0.95))
+    median, large = np.quantile(size, [0.5, 0.95]).tolist()
+    return float(np.sqrt(np.mean(size**2))), median, large

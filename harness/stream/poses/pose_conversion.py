@@ -94,7 +94,7 @@ def convert_poses(
     while raw:
         bodies.append(_to_body(raw.pop(0), order, unit_m, turn, start_s))
     unix = clock == "Unix time"
-    return PoseLog(tuple(bodies), path.name, tuple(findings), clock, start_s if unix else None)
+    return PoseLog(tuple(bodies), path.name, tuple(findings), clock, start_s if unix else None, start_s)
 
 
 def _conclude_clock(

@@ -39,24 +39,29 @@ def read_pose_log(paths: Path | str | Sequence[Path | str], options: PoseFileOpt
 
 def _join(stems: Sequence[str], logs: Sequence[PoseLog]) -> PoseLog:
     """Logs of several files as one."""
-    starts = [log.start_unix_s for log in logs]
-    if None in starts and any(start is not None for start in starts):
+    if len({log.start_unix_s is None for log in logs}) > 1:
         raise BadInput("Files with Unix times, and others without.", "Their clocks cannot be related: read them alone.")
-    first_s = min(start or 0.0 for start in starts)
+    begins, ends = [log.start_s for log in logs], [log.start_s + log.duration_s for log in logs]
+    shared = "their times overlap" if max(begins) < min(ends) else "each begins at its first time: they do not overlap"
+    if logs[0].start_unix_s is not None:
+        shared = "Unix times"
+    elif max(begins) >= min(ends):
+        begins = [0.0] * len(logs)
+    first_s = min(begins)
     bodies = []
-    for stem, log, start_s in zip(stems, logs, starts, strict=True):
+    for stem, log, begin_s in zip(stems, logs, begins, strict=True):
         for body in log.bodies:
             name = stem if len(log.bodies) == 1 else f"{stem}.{body.name}"
-            bodies.append(replace(body, name=name, times_s=body.times_s + ((start_s or 0.0) - first_s)))
+            bodies.append(replace(body, name=name, times_s=body.times_s + (begin_s - first_s)))
     findings = [
         FileFinding(f"{stem}: {finding.subject}", finding.value, finding.reason, finding.assumed)
         for stem, log in zip(stems, logs, strict=True)
         for finding in log.findings
     ]
-    shared = "Unix times" if starts[0] is not None else "the files have no Unix times; each begins at its first time"
     findings.append(FileFinding("common clock", "one for all files", shared, assumed=True))
     source = ", ".join(log.source for log in logs)
-    return PoseLog(tuple(bodies), source, tuple(findings), logs[0].clock, None if starts[0] is None else first_s)
+    start_unix_s = None if logs[0].start_unix_s is None else first_s
+    return PoseLog(tuple(bodies), source, tuple(findings), logs[0].clock, start_unix_s, first_s)
 
 
 def _read_file(path: Path, options: PoseFileOptions) -> PoseLog:

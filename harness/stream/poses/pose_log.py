@@ -69,6 +69,8 @@ class PoseLog:
     """What the times count, in words."""
     start_unix_s: float | None = None
     """Unix time of time 0 [s]; None where the source does not tell."""
+    start_s: float = 0.0
+    """The source's own time of time 0 [s]; by it, files of one clock are related."""
 
     def __post_init__(self) -> None:
         if not self.bodies or len(set(self.names)) < len(self.bodies):
@@ -104,4 +106,4 @@ class PoseLog:
         begin_s = min(float(body.times_s[0]) for body in bodies)
         shifted = tuple(replace(body, times_s=body.times_s - begin_s) for body in bodies)
         start_s = None if self.start_unix_s is None else self.start_unix_s + begin_s
-        return replace(self, bodies=shifted, start_unix_s=start_s)
+        return replace(self, bodies=shifted, start_unix_s=start_s, start_s=self.start_s + begin_s)

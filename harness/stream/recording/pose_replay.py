@@ -1,6 +1,6 @@
 """A pose log as a stream of frames."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from threading import Event
 
 import numpy as np
@@ -21,9 +21,20 @@ class PoseLogStream:
     log has none, and is never suspect.
     """
 
-    def __init__(self, log: PoseLog, speed: ReplaySpeed = "max", *, step: Callable[[], bool] = wait_for_enter) -> None:
-        """`speed` and `step` are those of `RecordingStream`."""
+    def __init__(
+        self,
+        log: PoseLog,
+        speed: ReplaySpeed = "max",
+        *,
+        step: Callable[[], bool] = wait_for_enter,
+        period_s: float | None = None,
+    ) -> None:
+        """`speed` and `step` are those of `RecordingStream`.
+
+        With a period [s], the frame of each period holds the latest pose of each body in it.
+        """
         self.log = log
+        self._period_s = period_s
         self._speed, self._step = speed, step
         self._closed = Event()
 
@@ -45,22 +56,27 @@ class PoseLogStream:
         return pace_frames(frames, self._speed, self._step, self._closed)
 
     def _all_frames(self) -> Iterator[TrackerFrame]:
-        times_s = np.unique(np.concatenate([body.times_s for body in self.log.bodies]))
-        for begin in range(0, len(times_s), _FRAMES_PER_PART):
-            yield from self._frames(times_s[begin : begin + _FRAMES_PER_PART])
+        instants = [self._instants(body.times_s) for body in self.log.bodies]
+        distinct = np.unique(np.concatenate(instants))
+        for begin in range(0, len(distinct), _FRAMES_PER_PART):
+            yield from self._frames(distinct[begin : begin + _FRAMES_PER_PART], instants)
 
-    def _frames(self, times_s: Floats) -> list[TrackerFrame]:
-        """Frames at these times, which are all those of the bodies between the first and the last."""
-        shape = len(times_s), len(self.log.bodies)
+    def _instants(self, times_s: Floats) -> Floats:
+        """What poses of one frame have in common: their time, or the number of their period."""
+        return times_s if self._period_s is None else np.rint(times_s / self._period_s)
+
+    def _frames(self, distinct: Floats, instants: Sequence[Floats]) -> list[TrackerFrame]:
+        """Frames of consecutive instants, of all those of the bodies."""
+        shape = len(distinct), len(self.log.bodies)
         measured_s = np.full(shape, np.nan)
         position_m, quaternion = np.full((*shape, 3), np.nan), np.full((*shape, 4), np.nan)
-        for n, body in enumerate(self.log.bodies):
-            first, last = np.searchsorted(body.times_s, [times_s[0], times_s[-1]], side="left")
-            part = slice(first, last + (last < len(body.times_s) and body.times_s[last] == times_s[-1]))
-            rows = np.searchsorted(times_s, body.times_s[part])
+        for n, (body, own) in enumerate(zip(self.log.bodies, instants, strict=True)):
+            part = slice(np.searchsorted(own, distinct[0]), np.searchsorted(own, distinct[-1], side="right"))
+            rows = np.searchsorted(distinct, own[part])  # of poses in one period the last one is assigned
             measured_s[rows, n] = body.times_s[part]
             position_m[rows, n], quaternion[rows, n] = body.positions_m[part], body.quaternions[part]
         valid = np.isfinite(measured_s)
         suspect = np.zeros(shape, dtype=bool)
         quality = valid.astype(np.float64)
-        return split_frames(times_s.tolist(), measured_s, position_m, quaternion, valid, valid, quality, suspect)
+        received_s = np.nanmax(measured_s, axis=1).tolist()
+        return split_frames(received_s, measured_s, position_m, quaternion, valid, valid, quality, suspect)

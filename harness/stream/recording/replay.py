@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from threading import Event
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -100,6 +100,21 @@ class RecordingStream:
     def stations(self) -> tuple[str, ...]:
         """Station names, in the order of the device's stations."""
         return self.wire.stations
+
+    @property
+    def path(self) -> Path:
+        """The file of the recording."""
+        return self.recording.path
+
+    @property
+    def note(self) -> dict[str, Any]:
+        """The latest note on the origin of the recording; empty when there is none."""
+        return self.recording.note
+
+    @property
+    def rate_hz(self) -> float:
+        """Rate of each station that the driver read [Hz]."""
+        return self.wire.rate_hz
 
     @property
     def device_zero_s(self) -> float:

@@ -20,6 +20,7 @@ from harness.errors import BadFile
 from harness.stream.polhemus.codec.decoder import Garbage, RecordRun
 from harness.stream.polhemus.codec.reader import ReadingsDecoder, WireFormat, make_decoder
 from harness.stream.polhemus.codec.readings import Readings, concatenate_readings
+from harness.stream.poses.pose_log import BodyPoses
 from harness.stream.recording.blocks import CONFIGURED, MARK, NOTE, RECEIVED, RecordingBlock, scan_blocks
 from harness.stream.recording.recording import EXPECTED_FILE, Recording, describe_damage, open_recording
 
@@ -58,6 +59,23 @@ class StationReadings:
 
     def __len__(self) -> int:
         return len(self.received_s)
+
+    def select(self, rows: slice | Bools) -> "StationReadings":
+        """The records of some rows."""
+        return StationReadings(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+    @staticmethod
+    def of_body(body: BodyPoses) -> "StationReadings":
+        """The poses of a log, whose clock is both the device's and the host's; quality 1."""
+        time_s, count = body.times_s, len(body.times_s)
+        turn = body.quaternions
+        return StationReadings(time_s, time_s, time_s, body.positions_m, turn, np.ones(count), np.zeros(count, bool))
+
+    @staticmethod
+    def join(parts: Sequence["StationReadings"]) -> "StationReadings":
+        """The records of one or more parts, one after another."""
+        columns = (np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(StationReadings))
+        return StationReadings(*columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +196,7 @@ class _Session:
         stations = {}
         for row, name in enumerate(self.wire.stations):
             parts, self._parts[row] = self._parts[row], []
-            stations[name] = _join(parts)
+            stations[name] = StationReadings.join(parts)
             del parts
         return stations
 
@@ -252,9 +270,3 @@ def _select(readings: Readings, stamps_s: Floats, row: int) -> StationReadings:
         readings.quality[rows],
         readings.suspect[rows],
     )
-
-
-def _join(parts: Sequence[StationReadings]) -> StationReadings:
-    """The parts of one station, one after another."""
-    columns = (np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(StationReadings))
-    return StationReadings(*columns)

@@ -4,7 +4,6 @@ The capture is decoded once, each simulation is made once, and each method is tr
 cells are kept in the folder of the study, so that a stopped study goes on where it was.
 """
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache, cached_property, partial
@@ -30,11 +29,13 @@ from harness.experiment.methods import DEFAULT_ISOLATION, NamedMethod, describe_
 from harness.experiment.scenarios import Scenario
 from harness.mocap import LibraryFolders
 from harness.results import cell_key, source_hash
-from harness.results.files import check_key, read_result_json, write_result_json
+from harness.results.files import check_key, file_digest, read_result_json, write_result_json
 from harness.score import LoopFrames
 from harness.simulate import Noise, sampling_times_s, simulate_tracker
-from harness.stream.recording import CaptureReader, RecordingStream
-from harness.study.trust.capture_readings import read_capture
+from harness.stream.recording import RecordingStream
+from harness.study.trust.capture_readings import CaptureReadings
+from harness.study.trust.logged_poses import open_capture
+from harness.study.trust.pose_source import holds_poses
 from harness.study.trust.reading_errors import (
     HealthCounts,
     count_health,
@@ -125,15 +126,28 @@ class _TrustTaskRun:
     """The evaluation of one capture; each part is made when it is first needed."""
 
     def __init__(self, task: TrustTask) -> None:
-        self.task, self.stream = task, RecordingStream(task.capture)
-        self.note = checked_note(self.stream)
+        self.task = task
+        self.source: CaptureReadings | RecordingStream
+        if holds_poses(task.capture):
+            self.source = open_capture(task.capture)
+            self.damage = self.source.damage
+        else:
+            self.source = RecordingStream(task.capture)
+            self.damage = self.source.recording.damage
+        self.note = checked_note(self.source)
         self.clip = task.clip or self.note.get("clip")
         if not self.clip:
             raise BadInput(f"Nothing says which clip {task.capture} is of.", "Name the clip of each with --truth.")
+        if holds_poses(Path(self.clip)):
+            raise BadInput(
+                f"{self.clip} holds poses of bodies and no performer's motion, on which methods could be ranked.",
+                f"Name a clip. `harness validate {task.capture} --truth {self.clip} --expect UNIT.toml` tells whether "
+                "clock, scale and speed error are those of the simulation's unit.",
+            )
         if self.note.get("posing"):
             raise BadInput(f"{task.capture} is of calibration poses.", "Name captures of motion.")
         self.playback = find_playback(
-            self.stream,
+            self.source,
             scenario=str(task.scenario_file),
             clip=self.clip,
             rate_hz=self.note.get("rate_hz"),
@@ -144,7 +158,7 @@ class _TrustTaskRun:
             for station in arm.stations:
                 if station not in self.playback.scenario.worn_stations:
                     raise UnknownName(f"station in {task.capture}", station, self.playback.scenario.worn_stations)
-        self.sha256 = hashlib.sha256(self.stream.recording.data).hexdigest()
+        self.sha256 = file_digest(task.capture, "a capture", "")
         self.methods_s, self.failures = 0.0, dict[str, str]()
 
     def run(self) -> ArmResults:
@@ -161,7 +175,7 @@ class _TrustTaskRun:
             clip=str(self.clip),
             sha256=self.sha256,
             frames=len(self.device.frames),
-            damage=self.stream.recording.damage,
+            damage=self.damage,
             notes=self.device.notes,
             stations=tuple(self.playback.scenario.worn_stations),
             rate_hz=self.device.rate_hz,
@@ -178,13 +192,14 @@ class _TrustTaskRun:
         """The capture, decoded once.
 
         The frames of a played motion are found by the device's clock. A capture that names no clip itself, and which
-        that clock does not relate to the named one, is registered with it.
+        that clock does not relate to the named one, is registered with it, and so is every pose log.
         """
-        try:
-            return recorded_take(self.stream, self.playback)
-        except BadInput:
-            if not self.task.clip or self.note.get("clip"):
-                raise
+        if isinstance(self.source, RecordingStream):
+            try:
+                return recorded_take(self.source, self.playback)
+            except BadInput:
+                if not self.task.clip or self.note.get("clip"):
+                    raise
         return self._registered()
 
     def _registered(self) -> ObservedTake:
@@ -192,11 +207,11 @@ class _TrustTaskRun:
 
         BadInput for motion or stations that are not those of the clip.
         """
-        capture = read_capture(CaptureReader(self.task.capture))
+        capture = self.source if isinstance(self.source, CaptureReadings) else open_capture(self.task.capture)
         found = validate_capture(capture, truth_of_playback(self.playback, host_clock=False))
         if found.exchanged:
             raise BadInput(f"{self.task.capture}: {', '.join(found.exchanged)} are exchanged.", "Name them anew.")
-        take = registered_take(self.stream, found.registration, self.playback, self.playback.tracker.rate_hz)
+        take = registered_take(capture.frames(), found.registration, self.playback, self.playback.tracker.rate_hz)
         offset_s = found.report.numbers["time_offset_orientation_s"].value
         note = (
             f"{self.task.capture.name} was registered with {self.clip}: its clock is {offset_s:.4f} s ahead, and "

@@ -9,8 +9,9 @@ import numpy as np
 
 from harness.errors import BadFile, BadInput
 from harness.measure import MeasuredPoses, mean_period_s
+from harness.stream import PoseLog
 from harness.stream.polhemus.codec import WireFormat
-from harness.stream.recording import CaptureReader, StationReadings
+from harness.stream.recording import CaptureReader, PoseLogStream, RecordingStream, StationReadings
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +29,12 @@ class CaptureReadings:
     """Descriptions of the damaged or truncated parts of the file."""
     left_out: tuple[str, ...]
     """What the file has beside the readings, a sentence each."""
+    log: PoseLog | None = None
+    """The poses of a pose log; None for a device's records."""
+
+    def frames(self) -> RecordingStream | PoseLogStream:
+        """The capture as a stream; poses of a log within one mean period are one frame."""
+        return PoseLogStream(self.log, period_s=1.0 / self.rate_hz) if self.log else RecordingStream(self.path)
 
     @property
     def stations(self) -> tuple[str, ...]:
@@ -73,8 +80,7 @@ def read_capture(reader: CaptureReader) -> CaptureReadings:
     readings = {}
     for station in reader.wire.stations:
         parts = [block.stations[station] for block in blocks if block.session == longest]
-        columns = ([getattr(part, name) for part in parts] for name in StationReadings.__dataclass_fields__)
-        readings[station] = StationReadings(*(np.concatenate(column) for column in columns))
+        readings[station] = StationReadings.join(parts)
     return CaptureReadings(reader.path, dict(reader.note), reader.wire, readings, tuple(reader.damage), tuple(left_out))
 
 

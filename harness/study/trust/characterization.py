@@ -186,7 +186,9 @@ def characterize_log(
     progress: ProgressCallback = lambda step, done, planned: None,
 ) -> Characterization:
     """Measure the source of a file of poses, and compare it with an earlier unit file, but with no preset."""
-    profile = replace(measure_log_profile(recording.log, bar=bar, progress=progress), damage=recording.damage)
+    profile = replace(
+        measure_log_profile(recording.log, recording.marks, bar=bar, progress=progress), damage=recording.damage
+    )
     known = {} if expected is None else unit_values(expected)
     return _compare(profile, recording.path, known, expected.name if expected else "")
 

@@ -4,7 +4,6 @@ The device's captures and simulations of the same takes are evaluated arm by arm
 compared: health of the streams, errors of the readings, equivalence of each metric, and the order of pairs of arms.
 """
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import combinations
@@ -23,7 +22,7 @@ from harness.experiment.workers import TaskExecutor, run_in_process
 from harness.measure import UnitFile
 from harness.mocap import LibraryFolders
 from harness.results import open_study
-from harness.results.files import FINDINGS, write_result_json
+from harness.results.files import FINDINGS, file_digest, write_result_json
 from harness.results.findings import (
     Equivalence,
     ErrorDistance,
@@ -32,6 +31,7 @@ from harness.results.findings import (
     TrustCapture,
     TrustFindings,
 )
+from harness.stream import PoseFileOptions
 from harness.stream.recording import PLAN_FILE, read_recording
 from harness.study.trust.arm_results import Arm, ArmResults, TrustTask, find_stations, run_capture
 from harness.study.trust.pair_agreement import (
@@ -44,6 +44,7 @@ from harness.study.trust.pair_agreement import (
     unit_of,
 )
 from harness.study.trust.plan import Plan, load_plan, parameter_variants, plan_digest, scenario_file, unit_file
+from harness.study.trust.pose_source import holds_poses, read_poses
 from harness.study.trust.reading_errors import (
     CORRELATION_TIMES,
     FEATURES,
@@ -104,7 +105,7 @@ def run_trust_study(
     if not captures or (clips and len(clips) != len(captures)):
         raise BadInput(f"{len(clips)} clips for {len(captures)} captures.", "Name one clip for each capture, or none.")
     carried = [_carried_plans(capture) for capture in captures]
-    digests = [_sha256(capture) for capture in captures]
+    digests = [file_digest(capture, "a capture", "") for capture in captures]
     if len(set(digests)) < len(digests):
         raise BadInput("A capture is named twice, or a copy of it.", "Name each once.")
     for capture, found in zip(captures, carried, strict=True):
@@ -140,7 +141,7 @@ def run_trust_study(
             title=plan.title or path.stem,
             scenario=plan.scenario,
             unit=plan.unit or scenario.noise_label,
-            unit_digest="" if unit is None else _sha256(unit),
+            unit_digest="" if unit is None else file_digest(unit, "a unit file", ""),
             plan_digest=digest,
             exploratory=exploratory and any(found != (digest,) for found in carried),
             level=plan.level,
@@ -320,6 +321,8 @@ def _compare_station(results: Sequence[ArmResults], k: int, station: str, featur
 
 def _carried_plans(path: Path) -> tuple[str, ...]:
     """Digests of the plans that a capture's notes carry; BadFile for notes of different clips."""
+    if holds_poses(path):
+        return (read_poses([path], PoseFileOptions()).plan,)
     capture = read_recording(path)
     if len(clips := capture.note_values("clip")) > 1:
         found = f"notes of different clips ({', '.join(clip or 'none' for clip in clips)})"
@@ -330,7 +333,3 @@ def _carried_plans(path: Path) -> tuple[str, ...]:
 def _unit_keys(unit: UnitFile) -> dict[str, Any]:
     """Scenario keys that a fitted unit replaces."""
     return {"noise": FITTED_PRESET, "profile": unit.name, "components": unit.components, "tracker": unit.tracker}
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()

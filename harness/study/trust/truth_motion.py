@@ -17,6 +17,7 @@ from harness.experiment import Playback
 from harness.experiment.scenarios import Scenario
 from harness.measure import TruthPoses
 from harness.simulate import exact_calibration, loop_motion
+from harness.stream import PoseLog
 from harness.study.trust.capture_readings import CaptureReadings, measured_poses
 
 _MARGIN_S = 0.5
@@ -49,10 +50,8 @@ class TruthMotion:
     """Whether the reference's clock is the host's clock of the capture, so that latency shows."""
     is_tracker: bool = False
     """Whether the reference is a tracker too, with errors of its own that a comparison with a preset would name."""
-    is_log: bool = False
-    """Whether the reference is a pose log, whose conventions nobody states."""
-    start_unix_s: float | None = None
-    """Unix time of time 0 of a pose log [s]; None where it does not tell."""
+    log: PoseLog | None = None
+    """The pose log that the reference is, whose conventions nobody states; None for another reference."""
     noise: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Body -> standard deviations of its positions [m] and rotations [rad] on each axis, where they are known."""
     loop_s: float = math.inf
@@ -139,9 +138,9 @@ def nominal_mounts(calibration: Calibration, stations: Sequence[str]) -> dict[st
 
 
 def truth_of_capture(other: CaptureReadings, stations: Sequence[str]) -> TruthMotion:
-    """Another capture as the reference: its stations are the bodies, those of the same name carry the stations.
+    """Another capture as the reference: its stations are the bodies.
 
-    Times are those of its device's clock. BadInput unless it has every station.
+    Times are those of its device's clock. BadInput as `pair_names`.
     """
     bodies = {}
     for name, readings in other.readings.items():
@@ -153,16 +152,22 @@ def truth_of_capture(other: CaptureReadings, stations: Sequence[str]) -> TruthMo
     lost = (f"{other.path.name}: {text}" for text in (*other.left_out, *other.damage))
     note = "Scale, heading and clocks are those relative to the other tracker, and are not compared with a preset."
     return TruthMotion(
-        f"the capture {other.path.name}", bodies, common_names(stations, bodies), is_tracker=True, notes=(note, *lost)
+        f"the capture {other.path.name}", bodies, pair_names(stations, bodies), is_tracker=True, notes=(note, *lost)
     )
 
 
-def common_names(stations: Sequence[str], bodies: Mapping[str, TruthPoses]) -> dict[str, str]:
-    """Each station with the body of its name; BadInput unless every station has one."""
-    missing = [name for name in stations if name not in bodies]
-    if missing:
+def pair_names(stations: Sequence[str], bodies: Mapping[str, TruthPoses]) -> dict[str, str]:
+    """Each station with the body of its name, in capital or small letters, or the only one with the only body.
+
+    Stations without a body are left out. BadInput where none has one.
+    """
+    if len(stations) == len(bodies) == 1:
+        return dict(zip(stations, bodies, strict=True))
+    named = {body.lower(): body for body in bodies}
+    pairs = {station: named[station.lower()] for station in stations if station.lower() in named}
+    if not pairs:
         raise BadInput(
-            f"The reference has no body {missing[0]!r}; it has {', '.join(bodies) or 'none'}.",
+            f"The reference has no body {', '.join(stations)}; it has {', '.join(bodies) or 'none'}.",
             "Name its bodies as the stations of the capture.",
         )
-    return {name: name for name in stations}
+    return pairs

@@ -1,6 +1,7 @@
 """The reference that a user names for a capture: found and read once, whatever kind it is of."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +11,15 @@ from harness.experiment import find_playback
 from harness.experiment.scenarios import Scenario, load_scenario
 from harness.measure import TruthSpline, coarse_offset
 from harness.mocap import CLIP_FORMATS, LibraryFolders, read_clip
-from harness.stream import PoseLog
-from harness.stream.recording import CaptureReader, RecordingStream, is_pose_file, open_poses
+from harness.stream import PoseFileOptions, PoseLog
+from harness.stream.recording import CaptureReader
 from harness.study.trust.capture_readings import CaptureReadings, measured_poses, read_capture
 from harness.study.trust.logged_poses import truth_of_log
-from harness.study.trust.marker_poses import read_marker_poses
-from harness.study.trust.truth_files import TRAJECTORY_SUFFIXES, is_foreign_table, read_truth_file
+from harness.study.trust.marker_poses import MARKER_SUFFIX, read_marker_poses
+from harness.study.trust.pose_source import holds_poses, read_poses
 from harness.study.trust.truth_motion import TruthMotion, truth_of_capture, truth_of_clip, truth_of_playback
 
+_POSE_SUFFIXES = (".tum", ".csv", ".txt")
 _LOOPED_CORRELATION = 0.8
 """Least correlation of angular speeds with which a capture shows a clip again and again [choice]."""
 
@@ -27,25 +29,32 @@ class TruthSource:
     """Where the reference of a capture is."""
 
     name: str
-    """A capture, a C3D, TUM, CSV or motion file, or a clip of a scenario."""
+    """A capture, poses of another program, a C3D or motion file, or a clip of a scenario."""
     scenario: str | None = None
     """Scenario with the stations and mounts of a clip; by default that of the capture's note."""
     folder: LibraryFolders | None = None
     """Folders of real motion."""
+    options: PoseFileOptions = field(default_factory=PoseFileOptions)
+    """What the user knows about a file of poses."""
 
 
 def load_truth(capture: CaptureReadings, source: TruthSource) -> TruthMotion:
     """The reference of a capture. BadFile, BadInput and UnknownName that name what is missing."""
-    path = Path(source.name)
+    path, stations, options = Path(source.name), capture.stations, source.options
     suffix = path.suffix.lower()
-    if path.is_file() and (log := _read_log(path, capture)) is not None:
-        return truth_of_log(log, capture.stations)
-    if path.is_dir() or suffix in TRAJECTORY_SUFFIXES:
-        return read_truth_file(path, capture.stations)
+    if path.is_dir():
+        return truth_of_log(_read_folder(path, stations, options), stations)
+    if suffix == MARKER_SUFFIX:
+        markers = read_marker_poses(path, options)
+        return truth_of_log(markers.log, stations, markers.noise)
+    if holds_poses(path) or suffix in _POSE_SUFFIXES:
+        return truth_of_log(read_poses([path], options).log, stations)
+    if options != PoseFileOptions():
+        raise BadInput(f"--unit or the like with {source.name}.", "It is for poses of another program: leave it out.")
     if suffix.lstrip(".") in (*CLIP_FORMATS, "asf"):
-        return truth_of_clip(read_clip(path), _scenario_of(capture, source), capture.stations)
+        return truth_of_clip(read_clip(path), _scenario_of(capture, source), stations)
     if path.is_file():
-        return truth_of_capture(read_capture(CaptureReader(path)), capture.stations)
+        return truth_of_capture(read_capture(CaptureReader(path)), stations)
     try:
         return _truth_of_scenario(capture, source)
     except UnknownName as error:
@@ -54,15 +63,24 @@ def load_truth(capture: CaptureReadings, source: TruthSource) -> TruthMotion:
         raise BadFile(path, "no such file", "a clip, or a file with a reference", "Check the path.") from error
 
 
-def _read_log(path: Path, capture: CaptureReadings) -> PoseLog | None:
-    """Poses of another program; None for a file of another kind, and for a table that names the capture's stations."""
-    if path.suffix.lower() == ".c3d" and capture.wire is None:
-        return read_marker_poses(path)
-    if path.suffix.lower().lstrip(".") in (*CLIP_FORMATS, "asf", "c3d") or not is_pose_file(path):
-        return None
-    if capture.wire is not None and path.suffix.lower() in TRAJECTORY_SUFFIXES and not is_foreign_table(path):
-        return None
-    return open_poses([path]).log
+def _read_folder(folder: Path, stations: Sequence[str], options: PoseFileOptions) -> PoseLog:
+    """The poses of the files STATION.tum or TAKE.STATION.tum of a folder, or .csv or .txt. BadFile."""
+    files: dict[str, Path] = {}
+    for path in sorted(folder.iterdir()):
+        for station in stations if path.suffix.lower() in _POSE_SUFFIXES else ():
+            if f".{path.stem}".lower().endswith(f".{station}".lower()):
+                if station in files:
+                    found = f"{files[station].name} and {path.name} of station {station!r}"
+                    raise BadFile(folder, found, "one file a station", "Move one of them.")
+                files[station] = path
+    if not files:
+        raise BadFile(folder, "no file of a station", f"such as {stations[0]}.tum", "Look at the folder.")
+    log = read_poses(list(files.values()), options).log
+    if len(log.bodies) != len(files):
+        raise BadFile(
+            folder, f"{len(log.bodies)} bodies in {len(files)} files", "one a file", "Name such a file alone."
+        )
+    return replace(log, bodies=tuple(replace(b, name=name) for b, name in zip(log.bodies, files, strict=True)))
 
 
 def _scenario_of(capture: CaptureReadings, source: TruthSource) -> Scenario:
@@ -76,8 +94,7 @@ def _scenario_of(capture: CaptureReadings, source: TruthSource) -> Scenario:
 
 def _truth_of_scenario(capture: CaptureReadings, source: TruthSource) -> TruthMotion:
     """A clip that the simulator or an emulator played, or that a performer did once."""
-    stream = RecordingStream(capture.path)
-    playback = find_playback(stream, scenario=source.scenario, clip=source.name, folder=source.folder)
+    playback = find_playback(capture, scenario=source.scenario, clip=source.name, folder=source.folder)
     if capture.note.get("source") == "simulation":
         return truth_of_playback(playback, capture.stations, host_clock=True)
     stamps_s = np.concatenate([one.stamp_s[np.isfinite(one.stamp_s)] for one in capture.readings.values()])

@@ -32,9 +32,10 @@ from harness.measure.reports import (
     residual_series,
 )
 from harness.stream.polhemus.codec import BITS_PER_BYTE, WireFormat, record_size
-from harness.stream.recording import RecordingStream, StationReadings
+from harness.stream.recording import StationReadings
 from harness.study.trust.capture_readings import CaptureReadings, measured_poses
 from harness.study.trust.characterization import correct_departures, preset_components, preset_values
+from harness.study.trust.logged_poses import describe_doubts
 from harness.study.trust.truth_motion import TruthMotion
 
 SCORED_METRICS = ("joint_angle_mean_deg", "mpjpe_mm", "root_position_mm", "jitter_m_s3")
@@ -100,18 +101,21 @@ def validate_capture(
     progress("registration", 1, 3)
     bodies: Mapping[str, TruthPoses] = truth.bodies
     directions: tuple[str, ...] = ()
-    if wire is None and truth.is_log:
-        named = {station: truth.body_of[station] for station in poses}
-        poses, bodies, directions = same_directions(poses, truth.bodies, named)
-    pairs, exchanged = _identify(poses, replace(truth, bodies=bodies))
-    registration = register_poses(
-        poses,
-        bodies,
-        pairs=pairs,
-        least_matched=options.least_matched,
-        plain=wire is None,
-        truth_noise=dict.fromkeys(bodies, options.truth_noise) if options.truth_noise else truth.noise,
-    )
+    try:
+        if wire is None and truth.log:
+            named = {station: truth.body_of[station] for station in poses}
+            poses, bodies, directions = same_directions(poses, truth.bodies, named)
+        pairs, exchanged = _identify(poses, replace(truth, bodies=bodies))
+        registration = register_poses(
+            poses,
+            bodies,
+            pairs=pairs,
+            least_matched=options.least_matched,
+            plain=wire is None,
+            truth_noise=dict.fromkeys(bodies, options.truth_noise) if options.truth_noise else truth.noise,
+        )
+    except BadInput as error:
+        raise type(error)(error.what, error.advice + describe_doubts(capture.log, truth.log)) from error
     progress("accuracy", 2, 3)
     numbers = {
         "time_offset_orientation_s": registration.values["time_offset_orientation_s"],
@@ -182,6 +186,7 @@ def _comparable_poses(capture: CaptureReadings, truth: TruthMotion) -> tuple[dic
     BadInput for stations without a body or without time stamps; NotComparable without a pose.
     """
     poses = {station: measured_poses(one) for station, one in capture.readings.items() if station in truth.body_of}
+    absent = ", ".join(station for station in capture.readings if station not in poses)
     if not poses:
         raise BadInput(
             f"No station of {capture.path.name} is in the reference.",
@@ -192,12 +197,14 @@ def _comparable_poses(capture: CaptureReadings, truth: TruthMotion) -> tuple[dic
     if not seen:
         raise NotComparable(f"No station of {capture.path.name} has a pose.", "Record positions and orientations.")
     unseen = ", ".join(station for station in poses if station not in seen)
-    return seen, (f"{unseen}: no pose in the whole capture; left out.",) if unseen else ()
+    notes = [f"{unseen}: no pose in the whole capture; left out."] if unseen else []
+    notes += [f"{absent}: no such body in the reference; left out."] if absent else []
+    return seen, tuple(notes)
 
 
 def _describe_clocks(capture: CaptureReadings, truth: TruthMotion, registration: Registration) -> tuple[str, ...]:
     """The offset between Unix times, where both logs have them."""
-    start_s, other_s = capture.note.get("start_unix_s"), truth.start_unix_s
+    start_s, other_s = capture.note.get("start_unix_s"), truth.log and truth.log.start_unix_s
     if start_s is None or other_s is None:
         return ()
     offset_s = registration.values["time_offset_orientation_s"].value + start_s - other_s
@@ -238,8 +245,7 @@ def evaluate_registered(
     capture, playback = found.capture, found.truth.playback
     if playback is None:
         raise BadInput(f"{found.truth.title} has no performer.", "Methods are scored on a clip.")
-    frames = RecordingStream(capture.path)
-    take = registered_take(frames, found.registration, playback, capture.rate_hz, found.truth.loop_s)
+    take = registered_take(capture.frames(), found.registration, playback, capture.rate_hz, found.truth.loop_s)
     return evaluate_each(methods, take, metrics=SCORED_METRICS, progress=progress)
 
 
@@ -301,16 +307,16 @@ def _checks(
         return []
     preset = preset_components()
     record_s = record_size(wire.items) * BITS_PER_BYTE / _DEFAULT_BAUD if wire else 0.0
-    known = {
+    of_preset = {
         "components.speed.ahead_s": preset_values()["components.speed.ahead_s"],
         "components.clock.drift_ppm": preset_values()["components.clock.drift_ppm"],
         "scale": Interval.normal(0.0, preset["session"]["scale"]),
         "heading_rad": Interval.normal(0.0, 0.0),
         "latency_s": Interval.normal(_DEFAULT_LATENCY_S + record_s, 0.0),
     }
+    known = of_preset if wire else {}
     if expected is not None:
-        known |= {key: one for key, one in expected.measured.items() if key in known}
-        known |= {key: one for key, one in expected.session.items() if key in known}
+        known |= {key: one for key, one in {**expected.measured, **expected.session}.items() if key in of_preset}
     checks = [
         compare_with_expected(key, "", numbers[key], one) for key, one in known.items() if numbers[key].is_measured
     ]

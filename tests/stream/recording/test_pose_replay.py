@@ -68,3 +68,17 @@ def test_it_waits_for_the_clock_or_for_a_person(monkeypatch: pytest.MonkeyPatch)
     assert time.monotonic() - begin_s >= 0.1
     monkeypatch.setattr("sys.stdin", io.StringIO("\n\n"))
     assert len(list(PoseLogStream(short, "step"))) == 2
+
+
+def test_poses_of_one_period_are_one_frame_with_the_latest_of_each_body() -> None:
+    """Body a has two poses in the second period of 0.1 s, and body b none in the third."""
+    times_s = {"a": [0.0, 0.08, 0.12, 0.2], "b": [0.01, 0.09, 0.31]}
+    bodies = [
+        BodyPoses(name, np.array(at), np.array(at)[:, None] * np.ones(3), np.tile([1.0, 0.0, 0.0, 0.0], (len(at), 1)))
+        for name, at in times_s.items()
+    ]
+    frames = list(PoseLogStream(PoseLog(tuple(bodies), "a.csv"), period_s=0.1))
+    assert [frame.received_s for frame in frames] == [0.01, 0.12, 0.2, 0.31]
+    assert [frame.position_valid.tolist() for frame in frames] == [[True] * 2, [True] * 2, [True, False], [False, True]]
+    np.testing.assert_array_equal(frames[1].measured_s, [0.12, 0.09])
+    np.testing.assert_array_equal(frames[1].position_m[:, 0], [0.12, 0.09])

@@ -1,12 +1,13 @@
 """A small trust study: six short clips of built-in motion, recorded as a device would send them."""
 
+import csv
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from harness.experiment import prepare_playback
-from harness.stream.recording import record_capture
+from harness.stream.recording import RecordingStream, record_capture
 from harness.study.trust.plan import plan_digest
 
 CLIPS = ("walking_p1_01", "walking_p2_01", "boxing_p1_01", "boxing_p2_01", "jumping_p1_01", "golf_p1_01")
@@ -64,3 +65,17 @@ def small_study(tmp_path_factory: pytest.TempPathFactory) -> SmallStudy:
         captures.append(folder / f"{clip}.rec")
         record_capture(captures[-1], simulation.wire_format, simulation.wire, {**note, "clip": clip})
     return SmallStudy(plan, captures)
+
+
+def write_log(capture: Path, path: Path) -> Path:
+    """The poses of a capture as a table in millimetres, an hour later."""
+    stream = RecordingStream(capture)
+    rows = [
+        [frame.measured_s[n] + 3600.0, name, *(1e3 * frame.position_m[n]), *frame.tracker_from_station[n]]
+        for frame in stream
+        for n, name in enumerate(stream.stations)
+        if frame.position_valid[n] and frame.orientation_valid[n]
+    ]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, delimiter=";").writerows([["time", "body", "x", "y", "z", "qw", "qx", "qy", "qz"], *rows])
+    return path

@@ -30,7 +30,7 @@ from harness.study.trust.trust_study import (
     run_trust_study,
 )
 from tests.results.finish import folder_bytes
-from tests.study.trust.conftest import CLIPS, SmallStudy
+from tests.study.trust.conftest import CLIPS, SmallStudy, write_log
 
 pytestmark = pytest.mark.long
 
@@ -76,7 +76,10 @@ def test_errors_of_the_simulation_are_not_those_of_the_device_though_the_seed_is
 
 
 def test_a_capture_of_a_performer_is_registered_with_the_clip(small_study: SmallStudy, tmp_path: Path) -> None:
-    """The room is not that of the scenario, so that only a registration relates the capture to the clip."""
+    """The room is not that of the scenario, so that only a registration relates the capture to the clip.
+
+    Then the same poses are a log of another program, with a clock of its own.
+    """
     text = small_study.plan.with_name("small.toml").read_text(encoding="utf-8").replace("= 3.0", "= 20.0")
     (tmp_path / "long.toml").write_text(text, encoding="utf-8")
     (tmp_path / "room.toml").write_text(text + "[tracker]\norigin_m = [0.3, -0.2, 2.6]\n", encoding="utf-8")
@@ -93,14 +96,17 @@ def test_a_capture_of_a_performer_is_registered_with_the_clip(small_study: Small
         found.append(run_capture(task))
         with pytest.raises(BadInput, match="Name the clip"):
             run_capture(replace(task, clip=""))
-    played, registered = found
-    assert (played.notes, len(registered.notes)) == ((), 1)
-    assert "room.toml.rec was registered with boxing_p1_01" in registered.notes[0]
-    errors = [result.device["ik:previous, all"]["joint_angle_mean_deg"] for result in found]
-    assert errors[1] == pytest.approx(errors[0], rel=0.15)
-    for feature in ("position error", "orientation error"):
-        spread = [float(np.nanstd(result.readings[0][feature][0])) for result in found]
-        assert spread[1] == pytest.approx(spread[0], rel=0.15)
+    found.append(run_capture(replace(task, capture=write_log(capture, tmp_path / "poses.csv"))))
+    played, *registered = found
+    assert played.notes == ()
+    for result, name in zip(registered, ("room.toml.rec", "poses.csv"), strict=True):
+        (note,) = result.notes
+        assert f"{name} was registered with boxing_p1_01" in note
+        errors = [one.device["ik:previous, all"]["joint_angle_mean_deg"] for one in (played, result)]
+        assert errors[1] == pytest.approx(errors[0], rel=0.15)
+        for feature in ("position error", "orientation error"):
+            spread = [float(np.nanstd(one.readings[0][feature][0])) for one in (played, result)]
+            assert spread[1] == pytest.approx(spread[0], rel=0.15)
 
 
 def test_readings_and_health_of_both_sides_are_alike(finished: Path) -> None:

@@ -1,6 +1,7 @@
 """References of a capture: clips, loops of an emulator, other captures."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from harness.mocap import synthetic
 from harness.simulate import Noise, exact_calibration, loop_motion, simulate_loop
 from harness.stream.recording import CaptureReader, record_capture
 from harness.study.trust.capture_readings import measured_poses, read_capture
-from harness.study.trust.truth_motion import common_names, truth_of_capture, truth_of_clip, truth_of_playback
+from harness.study.trust.truth_motion import pair_names, truth_of_capture, truth_of_clip, truth_of_playback
 
 CLIP = "boxing_p1_01"
 
@@ -110,7 +111,7 @@ def test_another_capture_gives_its_readings(playback: Playback, tmp_path: Path) 
     poses = measured_poses(other.readings["head"])
     np.testing.assert_array_equal(truth.bodies["head"].position_m, poses.position_m[poses.valid])
     assert truth.is_tracker
-    with pytest.raises(BadInput, match="no body 'nose'"):
+    with pytest.raises(BadInput, match="no body nose; it has"):
         truth_of_capture(other, ["nose"])
 
 
@@ -145,7 +146,9 @@ def test_lost_and_suspect_readings_are_not_valid(playback: Playback, tmp_path: P
         assert valid[(one.quality > 0.0) & ~one.suspect].all()
 
 
-def test_names_must_all_be_there() -> None:
-    assert common_names(["a"], {"a": None, "b": None}) == {"a": "a"}  # type: ignore[dict-item]
-    with pytest.raises(BadInput, match="no body 'a'; it has none"):
-        common_names(["a"], {})
+def test_stations_without_a_body_are_left_out_and_one_must_have_one() -> None:
+    bodies: dict[str, Any] = {"A": None, "b": None}
+    assert pair_names(["a", "c"], bodies) == {"a": "A"}
+    assert pair_names(["a"], {"x": bodies["b"]}) == {"a": "x"}
+    with pytest.raises(BadInput, match="no body c, d; it has A, b"):
+        pair_names(["c", "d"], bodies)
