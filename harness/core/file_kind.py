@@ -22,6 +22,7 @@ _READERS = {
     "a BVH motion": "`harness inspect` and `harness view` read it.",
     "a list of emitters": "`harness inspect` reads it as NAME.mcf.",
     "a file of results": "Name the folder that holds it.",
+    "an SQLite database": "",
     "an empty file": "",
     "binary data": "",
 }
@@ -39,7 +40,8 @@ _PATTERNS = (
     (rb"\A\x89IS900\r\n\x02\x00", POSES_KIND),
     (rb"\A\x89IS900\r\n", "a recording"),
     (rb"\A\s*HIERARCHY\s", "a BVH motion"),
-    (rb"\ASQLite format 3\x00", "a file of results"),
+    (rb"(?s)\ASQLite format 3\x00.*CREATE TABLE cells", "a file of results"),
+    (rb"\ASQLite format 3\x00", "an SQLite database"),
     (rb"(?m)^31F +\d", "a list of emitters"),
     (rb"\x00", "binary data"),
 )

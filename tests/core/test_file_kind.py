@@ -46,6 +46,7 @@ def test_a_damaged_file_of_results_is_none(tmp_path: Path) -> None:
     [
         (b"", "an empty file"),
         (b"\x00\xff", "binary data"),
+        (b"SQLite format 3\x00\nCREATE TABLE messages(id)", "an SQLite database"),
         (FILE_HEADER, "a recording"),
         (FILE_HEADER[:8] + b"\2\0\0\0", "a recording of poses"),
         (b"\nHIERARCHY\nROOT hip", "a BVH motion"),

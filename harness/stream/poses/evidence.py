@@ -22,6 +22,8 @@ _FASTEST = 20.0
 """Speed that a body, and hardly a vehicle, stays below [m/s] [choice]."""
 _USUAL_M = (0.3, 12.0)
 """Largest coordinates that are usual [m]: units with which a file has such are named as alternatives [choice]."""
+_FAR = 1e6
+"""Coordinates of a map, in metres, reach above it: in millimetres it is a kilometre [choice]."""
 _FULL_TURN = 6.3
 _COARSE_STEPS = 0.1
 """Resolution of times, in median steps, from which on it is told [choice]."""
@@ -112,11 +114,13 @@ def conclude_length_unit(
     else:
         name = "m" if speed <= 2.0 * _FASTEST and spread > _VEHICLE else "mm"
         doubtful = speed <= 2.0 * _FASTEST
-        name = name if times_s is not None else "mm"
+        name = "m" if size > _FAR else name if times_s is not None else "mm"
     others = [
         unit
         for unit, unit_m in LENGTH_UNITS_M.items()
-        if unit not in (name, "ft") and _USUAL_M[0] <= size * unit_m <= _USUAL_M[1] and speed * unit_m <= _FASTEST
+        if unit not in (name, "ft")
+        and ((times_s is None and unit == "m") or _USUAL_M[0] <= size * unit_m <= _USUAL_M[1])
+        and speed * unit_m <= _FASTEST
     ]
     if others:
         shown += f"; {' or '.join(others)} would fit as well: --unit decides"

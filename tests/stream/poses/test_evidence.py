@@ -97,6 +97,14 @@ def test_what_rests_far_away_is_in_millimetres() -> None:
     assert conclude_length_unit(rest, None, "", None)[0].value == "mm"
     road = np.stack([15.0 * np.arange(100), np.zeros(100), np.zeros(100)], axis=1)  # a car
     assert conclude_length_unit(road, np.arange(100.0), "", None)[0].value == "m"
+    found, unit_m = conclude_length_unit(rest + np.array([4e5, 5.4e6, 0.0]), np.arange(100.0), "", None)  # a map
+    assert (found.value, unit_m, found.assumed) == ("m", 1.0, True)
+
+
+def test_metres_are_named_beside_the_unit_of_a_file_without_times() -> None:
+    matrices = np.linspace(0.0, 450.0, 100)[:, None] * np.array([1.0, 0.0, 0.5])
+    found, _ = conclude_length_unit(matrices, None, "", None)
+    assert found.value == "mm" and "m or cm or in would fit" in found.reason
 
 
 def test_a_stated_or_given_unit_counts() -> None:
