@@ -104,7 +104,8 @@ def test_what_rests_far_away_is_in_millimetres() -> None:
 def test_metres_are_named_beside_the_unit_of_a_file_without_times() -> None:
     matrices = np.linspace(0.0, 450.0, 100)[:, None] * np.array([1.0, 0.0, 0.5])
     found, _ = conclude_length_unit(matrices, None, "", None)
-    assert found.value == "mm" and "m or cm or in would fit" in found.reason
+    assert found.value == "mm"
+    assert "m or cm or in would fit" in found.reason
 
 
 def test_a_stated_or_given_unit_counts() -> None:
