@@ -29,6 +29,17 @@ def test_records_have_the_layout_of_the_manual() -> None:
     assert device.send(b"O1,5,6,7,1\rFP") == (b"01  0.0000 1.0000 0.0000-1.0000 0.0000 0.0000 0.0000 0.0000 1.0000\r\n")
 
 
+def test_extended_precision_has_an_exponent() -> None:
+    """`3(Sx.xxxxxESxxb)` of the manual, revision G, page 59."""
+    device = FastrakSession(1)
+    position = b" 3.93701E+01 -1.96850E+01  5.90551E+01 "
+    assert device.send(b"O1,52,50,54,51\rP") == b"01 " + position + b"  9.00000E+01 -0.00000E+00  0.00000E+00 \r\n"
+    assert device.send(b"O1,52,4,1\rP") == b"01 " + position + b"  90.00  -0.00   0.00\r\n"
+    binary = device.send(b"fO1,2,11,1\rP")
+    assert device.send(b"O1,52,61,51\rP") == binary
+    assert b" EC -3*" in device.send(b"O1,2,52,1\r"), "the position twice"
+
+
 def test_the_status_has_the_layout_of_the_manual() -> None:
     """Firmware of 2012 has the tag `F3` and the map of the receivers; older firmware has blanks."""
     assert FastrakSession(3).send(b"S") == b"21S3F0         3.02  OutputCompensat CPG2030-003-10  \r\n"

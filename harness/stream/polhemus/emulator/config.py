@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.core.arrays import Floats, Ints
 from harness.errors import BadInput
-from harness.stream.polhemus.codec.items import STATION_CHARACTERS
+from harness.stream.polhemus.codec.items import EXTENDED_ITEMS, ITEMS, STATION_CHARACTERS
 from harness.stream.polhemus.emulator.faults import Fault, check_firmware
 
 PERIOD_S = 8.0
@@ -91,8 +91,8 @@ class EmulatorConfig:
     """Faults that are injected."""
     seed: int = 1
     """Seed of the faults' random draws."""
-    known_items: ClassVar[frozenset[int]] = frozenset()
-    """Items that the device knows; empty for all of `ITEMS` that its firmware has."""
+    known_items: ClassVar[frozenset[int]] = frozenset(ITEMS) - EXTENDED_ITEMS
+    """Items that the device knows, where its firmware has them."""
     usual_items: ClassVar[tuple[int, ...]] = ()
     """Output list that this project's driver requests; empty for that of a scenario."""
     known_stations: ClassVar[str] = STATION_CHARACTERS.decode()
