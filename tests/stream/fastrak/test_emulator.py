@@ -63,6 +63,44 @@ def test_lengths_in_commands_have_the_unit_of_records() -> None:
     assert device.send(b"UA2\r")[:24] == b"22A  39.37   0.00   0.00"
 
 
+@pytest.mark.parametrize(
+    ("hemisphere", "sign"),
+    [("1,0,0", 1), ("-1,0,0", -1), ("0,0,1", 1), ("0,0,-1", -1), ("0,1,0", -1), ("0.1,1,0", -1), ("0,0,0", 1)],
+)
+def test_signs_flip_outside_the_hemisphere(hemisphere: str, sign: int) -> None:
+    """The station is at (1, -0.5, 1.5) m; its orientation stays."""
+    device = FastrakSession(1)
+    device.send(f"uH1,{hemisphere}\r".encode())
+    position = "".join(f"{sign * value:7.2f}" for value in (100.0, -50.0, 150.0)).encode()
+    assert device.send(b"P") == b"01 " + position + b"  90.00  -0.00   0.00\r\n"
+    device.send(b"A1,0,0,0,0,100,0,-100,0,0\r")  # the alignment comes after it
+    turned = "".join(f"{sign * value:7.2f}" for value in (-50.0, -100.0, 150.0)).encode()
+    assert device.send(b"P")[3:24] == turned
+
+
+def test_a_real_device_begins_with_the_forward_hemisphere() -> None:
+    device = FastrakSession(1, FastrakEmulatorConfig(hemisphere=(-1.0, 0.0, 0.0)))
+    assert device.send(b"H1\r") == b"21H  -1.00   0.00   0.00\r\n"
+    assert device.send(b"P")[3:10] == b" -39.37"
+    assert FastrakSession(1).send(b"H1\r") == b"21H   0.00   0.00   0.00\r\n"
+
+
+def test_an_increment_holds_records_back() -> None:
+    """The stations move along X by 1 mm a reading."""
+    device = FastrakSession(2)
+    device.send(b"uI1,0.45\rI2,1\r")
+    assert device.send(b"I1\rUI1\r") == b"21I   0.45\r\n21I   0.18\r\n"
+    records = (device.send(b"uC") + device.wait(0.5)).splitlines()
+    tens = {c: [float(line[3:10]) for line in records if line[1:2] == c] for c in (b"1", b"2")}
+    for station, step in ((b"1", 0.5), (b"2", 1.0)):
+        assert len(tens[station]) > 1
+        np.testing.assert_allclose(np.diff(tens[station]), step, atol=0.011)
+    assert len(device.send(b"cP").splitlines()) == 2, "a poll has every station"
+    device.send(b"I1,0\rI2,0\r")
+    rates = [line[1:2] for line in (device.send(b"C") + device.wait(0.5)).splitlines()]
+    assert rates.count(b"1") > 2 * len(tens[b"1"])
+
+
 def test_boresight_turns_all_of_an_orientation() -> None:
     device = FastrakSession(1)
     device.send(b"G1,0,-15,5\rB1\rO1,4,1\r")
@@ -88,7 +126,8 @@ def test_stations_are_switched_and_told() -> None:
         (b"MS\r", -99),  # commands of InterSense
         (b"MZ\r", -99),
         (b"l*\r", -3),
-        (b"I1\r", -99),  # not stored
+        (b"Q1\r", -99),  # not stored
+        (b"I1,-1\r", -3),
     ],
 )
 def test_what_only_an_is900_has_is_refused(command: bytes, code: int) -> None:

@@ -98,7 +98,10 @@ class EmulatorConfig:
     known_stations: ClassVar[str] = STATION_CHARACTERS.decode()
     """Characters of the stations that the device can have."""
     fastrak: ClassVar[bool] = False
-    """Whether `B` turns all of an orientation, and lengths in commands have the unit of records, as on a FASTRAK."""
+    """Whether `B` turns all of an orientation, lengths in commands have the unit of records, and positions lie in a
+    hemisphere, as on a FASTRAK."""
+    hemisphere: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    """Hemisphere vector of each station after power-on (`H`)."""
 
     def __post_init__(self) -> None:
         check_firmware(self.firmware)
