@@ -59,7 +59,7 @@ def test_a_device_is_recorded_and_replayed(tmp_path: Path, command: Command) -> 
     link, file = tmp_path / "port", tmp_path / "one.rec"
     with serve_fastrak(make_samples(2, 60.0), pty=link):
         said = command("record", f"fastrak:{link}", file, "--seconds", "1", "--stations", "left,right")
-        assert "OutputCompensat CPG2030-003-10 at fastrak:" in said.err
+        assert "FASTRAK, firmware 3.02 at fastrak:" in said.err
         sent = command("record", f"fastrak:{link}", tmp_path / "two.rec", "--send", "S", "--send", "P").out
         with Fastrak(str(link), FastrakConfig(rate_hz=60.0)) as tracker:
             assert next(iter(tracker)).position_valid.all()

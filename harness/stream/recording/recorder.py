@@ -130,8 +130,7 @@ def record_port(
     counts: dict[str, int] = {}
     events = EventCounter(log)
     with _count_interrupt(counts), open_tracker_at(port, config, observer=writer, on_event=events) as device:
-        name = device.identification or "a device"
-        log(f"{name} at {port}; stations {device.station_list}; Ctrl-C ends the recording")
+        log(f"{device.identification} at {port}; stations {device.station_list}; Ctrl-C ends the recording")
         log(device.setup_note)
         end = threading.Timer(seconds or 0.0, device.close)
         if seconds is not None:

@@ -24,7 +24,7 @@ from serial.tools import list_ports
 from harness.core.network import FASTRAK_PREFIX, resolve_host
 from harness.errors import BadInput, HarnessError
 from harness.stream.polhemus.codec.datagram import DATAGRAM_START
-from harness.stream.polhemus.codec.items import BAUD_RATES, DeviceFamily
+from harness.stream.polhemus.codec.items import BAUD_RATES
 
 _BUSY_ERRNOS = (errno.EBUSY, errno.EAGAIN)
 _TCP_EXAMPLE = "tcp://HOST:PORT, such as tcp://127.0.0.1:5005"
@@ -117,11 +117,6 @@ WRITE_TIMEOUT_S, CONNECT_TIMEOUT_S = 2.0, 2.0
 """A line that takes no byte for so long is lost; a host that does not answer for so long is unreachable [s]."""
 _POLL_INTERVAL_S = 0.002
 """Interval between two reads of a port that cannot be waited for [s]."""
-
-
-def family_of(port: str) -> DeviceFamily:
-    """Return the family of the device at a port: an IS-900 unless its name says otherwise."""
-    return "fastrak" if port.startswith(FASTRAK_PREFIX) else "is900"
 
 
 class LineLost(HarnessError):

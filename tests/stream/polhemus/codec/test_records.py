@@ -328,7 +328,8 @@ def _tolerances(codes: tuple[int, ...], settings: RecordFormat) -> tuple[float, 
     else:
         quaternions[5] = quaternions[6] = quaternions[7] = np.inf
     position_tolerance_m = next((position_m_by_item[code] for code in codes if code in position_m_by_item), np.inf)
-    return position_tolerance_m, next((quaternions[code] for code in (11, 61, 20, 4, 54, 19, 5, 6, 7, 55) if code in quaternions and code in codes), np.inf)
+    by_rank = (quaternions.get(code, np.inf) for code in (11, 61, 20, 4, 54, 19, 5, 6, 7, 55) if code in codes)
+    return position_tolerance_m, next(by_rank, np.inf)
 
 
 def test_both_sizes_of_the_stylus_item() -> None:
