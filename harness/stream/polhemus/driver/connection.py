@@ -13,7 +13,8 @@ from harness.stream.polhemus.codec.commands import RESUME, STATUS, STOP
 from harness.stream.polhemus.codec.items import BAUD_RATES, DEVICE_NAMES, DeviceFamily, with_article
 from harness.stream.polhemus.codec.replies import DeviceError, ParsedReply, StatusRecord, parse_reply
 from harness.stream.polhemus.driver.config import DriverTiming, LineConfig
-from harness.stream.polhemus.driver.transport import LineLost, Transport, open_transport
+from harness.stream.polhemus.driver.open_transport import open_transport
+from harness.stream.polhemus.driver.transport import LineLost, Transport
 from harness.stream.tracker import DriverClosed
 
 

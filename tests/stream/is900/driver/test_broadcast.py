@@ -25,7 +25,7 @@ from harness.stream.line_events import LineEvent
 from harness.stream.polhemus.codec.datagram import Datagram, parse_datagram
 from harness.stream.polhemus.codec.samples import DeviceSamples
 from harness.stream.polhemus.driver.config import DriverTiming
-from harness.stream.polhemus.driver.transport import open_transport
+from harness.stream.polhemus.driver.open_transport import open_transport
 from harness.stream.polhemus.emulator.config import EmulatorConfig
 from harness.stream.polhemus.emulator.server import EmulatorServer
 from harness.stream.polhemus.emulator.udp_broadcast import parse_udp_address

@@ -13,7 +13,9 @@ import pytest
 import serial
 
 from harness.errors import BadInput
-from harness.stream.polhemus.driver.transport import LineLost, PolledSerialTransport, Transport, open_transport
+from harness.stream.polhemus.driver.open_transport import open_transport
+from harness.stream.polhemus.driver.serial_transport import PolledSerialTransport
+from harness.stream.polhemus.driver.transport import LineLost, Transport
 
 TIMEOUT_S = 120.0
 
