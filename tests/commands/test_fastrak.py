@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.stream.fastrak import Fastrak, FastrakConfig, FastrakEmulator, FastrakEmulatorConfig, serve_fastrak
+from harness.stream import serve_emulator
+from harness.stream.fastrak import Fastrak, FastrakConfig, FastrakEmulator, FastrakEmulatorConfig
 from harness.stream.polhemus import LineEmulator
 from tests.command import Command
 from tests.stream.is900.driver.bench import make_samples
@@ -57,7 +58,7 @@ def test_emulate_refuses_what_no_fastrak_has(flags: str, message: str, command: 
 
 def test_a_device_is_recorded_and_replayed(tmp_path: Path, command: Command) -> None:
     link, file = tmp_path / "port", tmp_path / "one.rec"
-    with serve_fastrak(make_samples(2, 60.0), pty=link):
+    with serve_emulator(make_samples(2, 60.0), FastrakEmulatorConfig(), pty=link):
         said = command("record", f"fastrak:{link}", file, "--seconds", "1", "--stations", "left,right")
         assert "FASTRAK, firmware 3.02 at fastrak:" in said.err
         sent = command("record", f"fastrak:{link}", tmp_path / "two.rec", "--send", "S", "--send", "P").out

@@ -1,10 +1,7 @@
-"""An emulated FASTRAK with its line, and its service at a port (docs/device.md, FASTRAK)."""
+"""An emulated FASTRAK with its line (docs/device.md, FASTRAK)."""
 
-import contextlib
-import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -20,7 +17,6 @@ from harness.stream.polhemus.emulator.config import EmulatorConfig
 from harness.stream.polhemus.emulator.device import IMMEDIATE_COMMANDS, CommandDevice, CommandTable, boresight_station
 from harness.stream.polhemus.emulator.device_state import DeviceState
 from harness.stream.polhemus.emulator.emulator import LineEmulator
-from harness.stream.polhemus.emulator.server import EmulatorServer, SentCallback, open_port, serve_in_thread
 from harness.stream.polhemus.emulator.setting_commands import (
     STATION_QUERIES,
     STATION_RESETS,
@@ -116,6 +112,8 @@ class FastrakDevice(CommandDevice):
 class FastrakEmulator(LineEmulator):
     """A FASTRAK and the line as a host sees them. Calls must have increasing times."""
 
+    device_type: ClassVar[type[CommandDevice]] = FastrakDevice
+
     def __init__(self, samples: DeviceSamples, config: FastrakEmulatorConfig | None = None, now_s: float = 0.0) -> None:
         """Switch the device on. Raises BadInput for samples that no FASTRAK can have, UnknownName for a fault's
         station that is not in them.
@@ -126,22 +124,4 @@ class FastrakEmulator(LineEmulator):
                 f"A FASTRAK with {len(samples.stations)} stations at {samples.rate_hz:g} Hz.",
                 f"It sends {MOST_DEVICE_HZ['fastrak']:g} records per second in total: give at most {limit_hz:g} Hz.",
             )
-        super().__init__(FastrakDevice(samples, config, now_s), now_s)
-
-
-@contextlib.contextmanager
-def serve_fastrak(
-    samples: DeviceSamples,
-    config: FastrakEmulatorConfig | None = None,
-    *,
-    pty: Path | str | None = None,
-    tcp: str | None = None,
-    on_sent: SentCallback | None = None,
-) -> Iterator[EmulatorServer]:
-    """Play samples as a FASTRAK at a pty behind a link, or at `host:port`, while the block runs.
-
-    `on_sent` receives each record and reply that was written, with its times and damage, in the emulator's thread.
-    """
-    emulator = FastrakEmulator(samples, config, time.monotonic())
-    with serve_in_thread(EmulatorServer(emulator, open_port(pty, tcp), on_sent)) as server:
-        yield server
+        super().__init__(samples, config, now_s)

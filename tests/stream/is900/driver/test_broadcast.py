@@ -17,10 +17,10 @@ import pytest
 from harness.cli import main
 from harness.errors import BadInput
 from harness.experiment import prepare_playback
+from harness.stream.emulators import serve_emulator
 from harness.stream.is900.driver.broadcast import Is900Broadcast
 from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import open_tracker
-from harness.stream.is900.emulator.emulator import serve_emulator
 from harness.stream.line_events import LineEvent
 from harness.stream.polhemus.codec.datagram import Datagram, parse_datagram
 from harness.stream.polhemus.codec.samples import DeviceSamples

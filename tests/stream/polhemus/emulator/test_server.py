@@ -8,8 +8,8 @@ import pytest
 
 from harness.errors import BadInput
 from harness.experiment import Playback, prepare_playback
+from harness.stream.emulators import serve_emulator
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.emulator.emulator import serve_emulator
 from harness.stream.polhemus.codec import commands
 from harness.stream.polhemus.codec.items import record_type
 from harness.stream.polhemus.codec.reader import FrameReader, WireFormat
