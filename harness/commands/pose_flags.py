@@ -51,6 +51,16 @@ def holds_poses(path: Path) -> bool:
     return is_pose_file(path)
 
 
+def holds_line(path: Path) -> bool:
+    """Whether a file is a recording of a device's line."""
+    from harness.stream.recording import FILE_HEADER
+
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(len(FILE_HEADER)) == FILE_HEADER
+
+
 def read_poses(paths: Sequence[Path], options: "PoseFileOptions") -> "PoseRecording":
     """Read a recording of poses, files of other programs, or clusters of markers. Raises BadFile or BadInput."""
     from harness.stream import PoseFileOptions
