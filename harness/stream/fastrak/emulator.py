@@ -71,9 +71,7 @@ class FastrakDevice(CommandDevice):
 
     config_type = FastrakEmulatorConfig
     commands: ClassVar[CommandTable] = CommandTable(
-        actions={
-            "B": lambda device, argument, now_s: boresight_station(device, argument, now_s, True),
-        },
+        actions={"B": lambda device, argument, now_s: boresight_station(device, argument, now_s, True)},
         setters={**STATION_SETTERS, "I": _set_increment, **dict.fromkeys(_WITHOUT_EFFECT, no_change)},
         set_only={**STATION_RESETS, "e": no_change, "y": no_change},
         queries={

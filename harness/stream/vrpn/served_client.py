@@ -19,12 +19,7 @@ class ServedClient(ClientSocket):
         self.greeted = False
         """Whether names were described to it, so that it gets reports."""
         self.unsent += COOKIE
-        self._reader, self._sequence = MessageReader(), 0
-
-    @property
-    def has_cookie(self) -> bool:
-        """Whether its cookie has arrived."""
-        return self._reader.greeted
+        self.reader, self._sequence = MessageReader(), 0
 
     def add(self, *messages: VrpnMessage) -> None:
         """Send messages as soon as the client takes them."""
@@ -34,4 +29,4 @@ class ServedClient(ClientSocket):
 
     def messages(self) -> Iterator[VrpnMessage]:
         """Yield what has arrived. Raises MalformedMessage."""
-        yield from self._reader.feed(self.receive())
+        yield from self.reader.feed(self.receive())

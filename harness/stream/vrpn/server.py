@@ -218,7 +218,7 @@ class VrpnServer:
                             client.add(pong)
         except MalformedMessage as error:
             client.gone = f"it sent what is no message of VRPN: {error.problem}"
-        if client.has_cookie and not client.greeted and not client.gone:
+        if client.reader.greeted and not client.greeted and not client.gone:
             self._greet(client)
 
     def _greet(self, client: ServedClient) -> None:
