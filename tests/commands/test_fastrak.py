@@ -75,8 +75,7 @@ def test_a_device_is_recorded_and_replayed(tmp_path: Path, command: Command) -> 
     assert any(line.startswith("right ") for line in said.lines)
     assert f"next: harness replay {file}" in said.err
     assert "--unit with one.rec" in command("inspect", file, "--unit", "mm", code=2).err
-    sent = command("inspect", tmp_path / "two.rec")
-    assert sent.lines[0].endswith(" a FASTRAK at 60 Hz, items 2,4,1 in ASCII")
+    assert command("inspect", tmp_path / "two.rec").lines[0].endswith(" a FASTRAK at 60 Hz, items 2,4,1 in ASCII")
 
 
 def test_a_recording_of_stretches_is_inspected(tmp_path: Path, command: Command) -> None:

@@ -15,8 +15,6 @@ def open_transport(port: str, baud: int = 115200) -> Transport:
     """
     name = port.removeprefix(FASTRAK_PREFIX)
     if not name:
-        prefix = port or ""
-        raise BadInput(
-            f"Port {port!r}: no port is named.", f"Write {prefix}/dev/ttyUSB0, {prefix}COM3 or {prefix}tcp://HOST:PORT."
-        )
+        advice = f"Write {port}/dev/ttyUSB0, {port}COM3 or {port}tcp://HOST:PORT."
+        raise BadInput(f"Port {port!r}: no port is named.", advice)
     return open_network(name) if "://" in name else open_serial(name, baud)

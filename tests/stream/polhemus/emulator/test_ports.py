@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadInput
+from harness.stream.client_socket import MAX_CLIENTS
 from harness.stream.emulators import serve_emulator
 from harness.stream.is900.emulator.emulator import Emulator
 from harness.stream.polhemus.emulator.config import EmulatorConfig
@@ -23,7 +24,7 @@ from harness.stream.polhemus.emulator.device_state import SentMessage
 from harness.stream.polhemus.emulator.faults import Fault
 from harness.stream.polhemus.emulator.pty_port import PtyPort
 from harness.stream.polhemus.emulator.server import EmulatorServer, open_port
-from harness.stream.polhemus.emulator.tcp_port import MAX_CLIENTS, TcpPort
+from harness.stream.polhemus.emulator.tcp_port import TcpPort
 from tests.stream.is900.emulator.played import make_samples
 
 TIMEOUT_S = 120.0
