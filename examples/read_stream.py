@@ -13,7 +13,7 @@ from harness.stream.is900 import DriverConfig
 
 def read(port: str, stations: tuple[str, ...] | None = None, frames: int = 40) -> None:
     with harness.Is900(port, DriverConfig(stations=stations)) as device:
-        print(f"{device.identification or 'an IS-900'}, {device.wire.rate_hz:.0f} frames per second")
+        print(f"{device.identification}, {device.wire.rate_hz:.0f} frames per second")
         for frame in islice(device, frames):
             words = [
                 f"{name} ({x:+.2f}, {y:+.2f}, {z:+.2f}) m" if valid else f"{name} lost"

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from harness.reconstruct import list_methods as methods
     from harness.results import load_run as load
     from harness.score import score_estimate
-    from harness.stream.is900 import Emulator, Is900, serve_emulator
+    from harness.stream import serve_emulator
+    from harness.stream.is900 import Emulator, Is900
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 

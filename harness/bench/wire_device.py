@@ -15,7 +15,7 @@ from threading import Thread
 import numpy as np
 
 from harness.experiment import prepare_playback
-from harness.stream.is900 import serve_emulator
+from harness.stream import serve_emulator
 from harness.stream.polhemus import EmulatorConfig, SentMessage
 from harness.stream.polhemus.codec import SHORT_LIST, STANDARD_LIST, describe_list
 

@@ -155,7 +155,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "tuple[CalibrationOutcom
         device = opened.enter_context(
             open_tracker_at(args.port, config, on_event=lambda event: print_status(f"line: {event.text}"))
         )
-        where = f"{device.identification or 'an IS-900'} at {args.port}"
+        where = f"{device.identification} at {args.port}"
         print_status(f"{where}; stations {device.station_list}; Ctrl-C ends it")
         print_status(device.setup_note)
         collector = session.collect_poses(device, print_status, displays)

@@ -2,7 +2,6 @@
 
 import argparse
 import shlex
-import time
 from collections.abc import Sequence
 from contextlib import ExitStack, closing, suppress
 from typing import TYPE_CHECKING
@@ -34,7 +33,7 @@ from harness.errors import BadInput, Outcome
 if TYPE_CHECKING:
     from harness.experiment.scenarios import Scenario
     from harness.stream import TrackerConfig
-    from harness.stream.polhemus import EmulatorConfig, LineEmulator
+    from harness.stream.polhemus import EmulatorConfig
     from harness.stream.polhemus.codec import DeviceSamples
 
 
@@ -81,6 +80,7 @@ def add_emulate(verbs: Verbs) -> None:
 
 
 def run_emulate(args: argparse.Namespace) -> Outcome:
+    from harness.stream import open_emulator
     from harness.stream.polhemus import open_port, parse_udp_address, play_emulator
     from harness.stream.polhemus.codec import check_emulated_capacity, check_range, missing_items
 
@@ -102,7 +102,7 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     scenario, tracker = playback.scenario, playback.tracker
     config = _config(args, scenario, udp[1] if udp else None)
     samples = playback.samples  # before the port opens: clients expect an open port to answer
-    emulator = _emulator(config, samples)
+    emulator = open_emulator(samples, config)
     items = args.items or config.usual_items or tracker.items
     check_range(args.items or (), playback.reach_m)
     if not (args.unpaced or tracker.overload):
@@ -134,20 +134,19 @@ def _serve_vrpn(
     args: argparse.Namespace, samples: "DeviceSamples", config: "EmulatorConfig", items: tuple[int, ...]
 ) -> Outcome:
     """Use the emulated device as its driver does, and serve what it reports."""
-    from harness.stream import EventCounter, open_tracker_at
-    from harness.stream.fastrak import FastrakConfig, FastrakEmulatorConfig, serve_fastrak
-    from harness.stream.is900 import DriverConfig, serve_emulator
+    from harness.stream import EventCounter, open_tracker_at, serve_emulator
+    from harness.stream.fastrak import FastrakConfig, FastrakEmulatorConfig
+    from harness.stream.is900 import DriverConfig
     from harness.stream.vrpn import RelayedStream, describe_sensors, open_server
 
     with ExitStack() as opened:
         with defer_interrupts():
             server = opened.enter_context(open_server(args.vrpn, anywhere=args.anywhere, log=print_status))
-        place, characters = f"{LOOPBACK}:0", config.station_characters(len(samples.stations))
+        device = opened.enter_context(serve_emulator(samples, config, tcp=f"{LOOPBACK}:0"))
+        characters = config.station_characters(len(samples.stations))
         if isinstance(config, FastrakEmulatorConfig):
-            device = opened.enter_context(serve_fastrak(samples, config, tcp=place))
             driver: TrackerConfig = FastrakConfig(items=items, stations=samples.stations, characters=characters)
         else:
-            device = opened.enter_context(serve_emulator(samples, config, tcp=place))
             driver = DriverConfig(items=items, stations=samples.stations, characters=characters)
         events = EventCounter(lambda text: print_status(f"line: {text}"))
         tracker = opened.enter_context(open_tracker_at(device.name, driver, on_event=events))
@@ -184,15 +183,6 @@ def _prepare_fastrak(args: argparse.Namespace, stations: int | Sequence[str] | N
     count = stations if isinstance(stations, int) else len(stations or ())
     count = count or default_station_count(load_scenario(args.scenario))
     args.rate = args.rate or MOST_DEVICE_HZ["fastrak"] / count
-
-
-def _emulator(config: "EmulatorConfig", samples: "DeviceSamples") -> "LineEmulator":
-    from harness.stream.fastrak import FastrakEmulator, FastrakEmulatorConfig
-    from harness.stream.is900 import Emulator
-
-    if isinstance(config, FastrakEmulatorConfig):
-        return FastrakEmulator(samples, config, time.monotonic())
-    return Emulator(samples, config, time.monotonic())
 
 
 def _config(args: argparse.Namespace, scenario: "Scenario", udp_port: int | None) -> "EmulatorConfig":

@@ -1,4 +1,4 @@
-"""The verb `inspect`: describe a motion file, poses of another program, or the coverage of a constellation."""
+"""The verb `inspect`: describe a motion file, a recording, poses of another program, or the coverage of emitters."""
 
 import argparse
 import sys
@@ -13,7 +13,9 @@ from harness.commands.flags import (
 )
 from harness.commands.output import print_result
 from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags
+from harness.core.file_kind import file_kind
 from harness.core.input_file import check_input_file
+from harness.core.number_format import count_noun
 from harness.core.units import parse_length_unit
 from harness.errors import Outcome
 
@@ -27,12 +29,12 @@ def add_inspect(verbs: Verbs) -> None:
     verb = add_verb(
         verbs,
         "inspect",
-        "describe a motion file, poses of another program, or the coverage of a constellation of emitters",
+        "describe a motion file, a recording, poses of another program, or the coverage of a constellation of emitters",
         run_inspect,
         "mocap",
     )
     text = (
-        "an AMC, BVH, MVNX, C3D or AMASS npz file, an MCF file of emitters, a recording of poses, or poses of another "
+        "an AMC, BVH, MVNX, C3D or AMASS npz file, an MCF file of emitters, a recording, or poses of another "
         "program (TUM, EuRoC, CSV, matrices), one file or several on one clock"
     )
     verb.add_argument("file", type=Path, nargs="+", help=text)
@@ -53,7 +55,8 @@ def add_inspect(verbs: Verbs) -> None:
 
 def run_inspect(args: argparse.Namespace) -> Outcome:
     paths, first = args.file, args.file[0]
-    if len(paths) > 1 or _is_of_poses(first):
+    of_line = len(paths) == 1 and file_kind(first) == "a recording"
+    if len(paths) > 1 or (_is_of_poses(first) and not of_line):
         from harness.commands.inspect_poses import inspect_poses
 
         refuse_flags(args, (*_OF_CONSTELLATIONS, "mocap"), "with poses", "It is for other files: leave it out.")
@@ -61,6 +64,9 @@ def run_inspect(args: argparse.Namespace) -> Outcome:
             check_input_file(path, _KINDS, sys.maxsize)
         return inspect_poses(args, paths)
     args.file = first
+    if of_line:
+        refuse_flags(args, (*_OF_CONSTELLATIONS, *POSE_FLAGS, "mocap"), f"with {first.name}", "It is for other files.")
+        return _inspect_line(args)
     refuse_flags(args, _OF_POSES, f"with {first.name}", "It is for poses of another program.")
     if first.suffix.lower() == CONSTELLATION_SUFFIX:
         from harness.commands.inspect_constellation import inspect_constellation
@@ -84,3 +90,26 @@ def _is_of_poses(path: Path) -> bool:
 
     others = (*(f".{kind}" for kind in (*CLIP_FORMATS, "asf")), CONSTELLATION_SUFFIX)
     return path.suffix.lower() not in others
+
+
+def _inspect_line(args: argparse.Namespace) -> Outcome:
+    """Print what a recording of a device's line is of, and how its stations reported."""
+    from harness.stream import StreamSummary
+    from harness.stream.recording import RecordingStream, read_recording
+
+    recording = read_recording(args.file)
+    if not recording.formats:
+        commands = count_noun(len(recording.answers), "command")
+        text = f"{args.file}: a recording of {commands} and their answers, without frames"
+        return print_result(args, {"answers": len(recording.answers)}, text, following=["replay", args.file])
+    stream = RecordingStream(recording)
+    summary = StreamSummary(stream.stations)
+    for frame in stream:
+        summary.add(frame)
+    stretches = [str(mark["stretch"]) for mark in recording.marks if mark.get("stretch")]
+    title = f"{args.file}: a recording of {stream.wire.describe()}"
+    content = {"recording": title, "stretches": stretches, "lost": recording.damage, **summary.as_dict()}
+    lines = [title, *([f"stretches: {', '.join(stretches)}"] if stretches else [])]
+    lines += [f"lost: {lost}" for lost in recording.damage]
+    following = ["characterize" if "static" in stretches else "replay", args.file]
+    return print_result(args, content, *lines, "", str(summary), following=following)

@@ -212,7 +212,7 @@ def _open_device(
                 f"The device sends {runs_hz:.1f} frames per second, {playback.scenario.name} has {rate_hz:g}.",
                 f"Say --rate {runs_hz:.0f}: a method learns at the tracker's rate.",
             )
-        where = f"{device.identification or 'an IS-900'} at {port}, {rate_hz:g} Hz"
+        where = f"{device.identification} at {port}, {rate_hz:g} Hz"
         print_status(f"{where}; stations {device.station_list}")
         print_status(device.setup_note)
         yield device

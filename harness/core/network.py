@@ -21,6 +21,37 @@ def resolve_host(host: str, port: int, kind: socket.SocketKind) -> list[tuple[so
     return sorted(found, key=lambda one: one[0] != socket.AF_INET)
 
 
+def connect_tcp(host: str, port: int, timeout_s: float) -> socket.socket:
+    """A connection to the first address of a host that answers within `timeout_s` [s]; small packets go at once.
+
+    Raises OSError of the first address if none answers, and UnicodeError for a name that no host can have.
+    """
+    errors = []
+    for family, resolved in resolve_host(host, port, socket.SOCK_STREAM):
+        opened = socket.socket(family, socket.SOCK_STREAM)
+        opened.settimeout(timeout_s)
+        try:
+            opened.connect(resolved)
+        except OSError as error:
+            opened.close()
+            errors.append(error)
+        else:
+            opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            return opened
+    raise errors[0]
+
+
+def describe_network_error(error: Exception, host: str, port: int) -> str:
+    """Why a host could not be reached, or an address not be used, without numbers of errors."""
+    if isinstance(error, (socket.gaierror, UnicodeError)):
+        return f"there is no host called {host}"
+    if isinstance(error, TimeoutError):
+        return f"{host} does not answer"
+    if isinstance(error, ConnectionRefusedError):
+        return f"nothing listens at {host}, port {port}"
+    return str(getattr(error, "strerror", None) or error)
+
+
 def parse_address(text: str, default_host: str = "") -> tuple[str, int]:
     """Split `HOST:PORT`, or `PORT` where there is a default host. Raises BadInput."""
     host, _, number = text.rpartition(":")

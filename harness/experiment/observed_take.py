@@ -63,7 +63,8 @@ class ObservedTake:
     @cached_property
     def records_arrived(self) -> int:
         """Number of records in the frames that have a truth."""
-        return sum(int(np.isfinite(self.frames[row].measured_s).sum()) for loop in self.loops for row in loop.rows)
+        frames = (self.frames[row] for loop in self.loops for row in loop.rows)
+        return sum(int((np.isfinite(f.measured_s) | f.position_valid | f.orientation_valid).sum()) for f in frames)
 
     @property
     def records_expected(self) -> int:

@@ -1,8 +1,8 @@
 """Takes from recordings: the motion that was played or performed, and the true pose of each frame.
 
 - Motion that an emulator or the simulator played has a truth by the device's clock, which counts from the beginning of
-  the motion; later loops are folded back. The way back to the beginning of a loop has no truth. Neither has a frame
-  whose readings differ from those of the motion.
+  the motion, or by the positions where the device has no clock; later loops are folded back. The way back to the
+  beginning of a loop has no truth. Neither has a frame whose readings differ from those of the motion.
 - A capture of a performer has a truth where a registration relates its clock to that of a clip.
 """
 
@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
@@ -33,6 +34,9 @@ RATE_TOLERANCE = 0.02
 """Relative tolerance within which a rate measured by the driver counts as the scenario's."""
 POSITION_TOLERANCE_M = 0.01
 """Largest median distance of a frame's readings from the played ones; rounding on the wire is a hundredth of it [m]."""
+_MOST_ROUNDS_OFF, _STILL_M = 2.0, 3e-4
+"""Rounds between the time of a frame and its reading, at most; a motion that positions on the wire do
+not tell from rest [m] [choices]."""
 MIN_MATCHED_SHARE = 0.5
 """Smallest share of frames that match the motion; with fewer the recording is of another motion (our choice)."""
 
@@ -220,17 +224,15 @@ def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: D
     shape = len(frames), len(samples.stations)
     sound = ~np.array([f.suspect for f in frames], bool).reshape(shape)
     stamp_s = np.array([f.measured_s for f in frames]).reshape(shape) - zero_s[:, None]
-    if not np.isfinite(stamp_s).any():
-        raise BadInput(
-            "The records have no time stamps, so that no frame can be found in the clip.",
-            "`harness validate` registers the recording with a reference by its motion.",
-        )
-    since = (stamp_s - samples.device_s[0]) * (len(samples) / samples.device_loop_s)
-    number = np.round(_row_medians(np.where(sound, since, np.nan)))
+    position_m = np.array([f.position_m for f in frames]).reshape(*shape, 3)
+    if np.isfinite(stamp_s).any():
+        since = (stamp_s - samples.device_s[0]) * (len(samples) / samples.device_loop_s)
+        number = np.round(_row_medians(np.where(sound, since, np.nan)))
+    else:
+        number = _rounds_by_position(position_m, np.array([f.received_s for f in frames]), samples)
     timed = number >= 0.0
     lap, index = np.divmod(np.where(timed, number, 0.0).astype(np.int64), len(samples))
     in_take = timed & (index < samples.take_frames)
-    position_m = np.array([f.position_m for f in frames]).reshape(*shape, 3)
     off_m = _row_medians(np.where(sound, np.linalg.norm(position_m - samples.position_m[index], axis=2), np.nan))
     played = in_take & ~(off_m > POSITION_TOLERANCE_M)  # NaN: no positions are sent, or all stations are lost
     if not played.any() or played.sum() < MIN_MATCHED_SHARE * in_take.sum():
@@ -244,6 +246,30 @@ def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: D
         LoopFrames(part_rows, index[part_rows])
         for part_rows in (_strictly_increasing_rows(part, index) for part in np.split(rows, turns))
     ]
+
+
+def _rounds_by_position(position_m: Floats, received_s: Floats, samples: DeviceSamples) -> Floats:
+    """Number of the round (F,) that each frame plays, counted through the loops, for a device without a clock.
+
+    The positions (F, S, 3) nearest to a frame's show the instant. Together they relate the times of reception (F,) to
+    the motion. A frame at rest, without a station, or whose nearest instant is far from its time has that time's.
+    """
+    rows, count = np.isfinite(position_m).all(axis=(1, 2)), len(samples)
+    if not rows.any():
+        return np.full(len(position_m), np.nan)
+    nearest = cKDTree(samples.position_m.reshape(count, -1)).query(position_m[rows].reshape(rows.sum(), -1))[1]
+    since = received_s * (count / samples.loop_s)
+    turn = np.exp(2j * np.pi * (nearest - since[rows]) / count)
+    middle = np.mean(turn)
+    ahead_rad = np.angle(middle) + np.median(np.angle(turn / middle))
+    expected = since + count * ahead_rad / (2.0 * np.pi)
+    number = np.round(expected)
+    there_m = samples.position_m[number[rows].astype(np.int64) % count]
+    still = np.abs(position_m[rows] - there_m).max(axis=(1, 2)) < _STILL_M
+    near = nearest + count * np.round((expected[rows] - nearest) / count)
+    number[rows] = np.where(still | (np.abs(near - expected[rows]) > _MOST_ROUNDS_OFF), number[rows], near)
+    out: Floats = number - count * np.floor(number.min() / count)
+    return out
 
 
 def _strictly_increasing_rows(rows: Ints, index: Ints) -> Ints:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
+    from harness.stream.emulators import open_emulator, serve_emulator
     from harness.stream.frame import TrackerFrame, TrackerStream, split_frames
     from harness.stream.host_clock import HostClockEstimator, UnixTimeEstimator
     from harness.stream.inputs import INPUT_COMBINATIONS, make_inputs
@@ -42,6 +43,8 @@ __all__ = [
     "frame_rows",
     "make_inputs",
     "measure_sampling",
+    "open_emulator",
     "open_tracker_at",
+    "serve_emulator",
     "split_frames",
 ]

@@ -67,7 +67,7 @@ class OpenTracker(ABC):
     @property
     @abstractmethod
     def identification(self) -> str:
-        """Name that the device reports, if any."""
+        """What the device is, in words."""
 
     @property
     @abstractmethod

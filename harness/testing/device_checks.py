@@ -10,7 +10,8 @@ from serial.tools import list_ports
 
 from harness.core.arrays import Floats
 from harness.errors import HarnessError
-from harness.stream.is900 import DriverConfig, open_tracker, serve_emulator
+from harness.stream import serve_emulator
+from harness.stream.is900 import DriverConfig, open_tracker
 from harness.stream.polhemus import EmulatorConfig
 from harness.stream.polhemus.codec import DeviceSamples
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.stream.is900 import serve_emulator
+from harness.stream import serve_emulator
 from harness.stream.polhemus import EmulatorConfig, Fault
 from harness.stream.polhemus.codec import DeviceSamples, from_yaw_pitch_roll_deg
 

@@ -8,7 +8,8 @@ import pytest
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.stream.fastrak import serve_fastrak
+from harness.stream import serve_emulator
+from harness.stream.fastrak import FastrakEmulatorConfig
 from harness.stream.polhemus.codec import DeviceSamples, from_yaw_pitch_roll_deg
 from tests.clients import device as circles
 from tests.clients.device import yaw_pitch_roll_deg
@@ -51,7 +52,7 @@ def test_the_package_reads_every_pose(tmp_path: Path) -> None:
     support = pytest.importorskip("fastrakSerialDriver.commands.support")
     samples = make_samples()
     position_m, quaternions = samples.position_m[:, 1], samples.tracker_from_station[:, 1]
-    with serve_fastrak(samples, pty=tmp_path / "port") as server:
+    with serve_emulator(samples, FastrakEmulatorConfig(), pty=tmp_path / "port") as server:
         device = package.FastrakDevice(str(tmp_path / "port"), station=support.FastrakStations.STATION_2)
         device.enableStream()
         until_s = time.monotonic() + LIMIT_S
@@ -77,7 +78,7 @@ def test_the_package_reads_every_pose(tmp_path: Path) -> None:
 
 def test_vr_juggler_polls_it(tmp_path: Path) -> None:
     link = tmp_path / "port"
-    with serve_fastrak(circles.make_samples(3, 40.0), pty=link):
+    with serve_emulator(circles.make_samples(3, 40.0), FastrakEmulatorConfig(), pty=link):
         client = VrJuggler(str(link))
         client.open(LIMIT_S)
         assert client.stations == 3
@@ -92,7 +93,7 @@ def test_vr_juggler_polls_it(tmp_path: Path) -> None:
 
 def test_vrpn_serves_it(tmp_path: Path) -> None:
     link = tmp_path / "port"
-    with serve_fastrak(circles.make_samples(4, 30.0), pty=link) as server:
+    with serve_emulator(circles.make_samples(4, 30.0), FastrakEmulatorConfig(), pty=link) as server:
         client = VrpnClient(str(link))
         assert client.serve(lambda: len(client.reports) >= 120, 60.0), client.log
         client.close()

@@ -31,8 +31,7 @@ from harness.core.motion import BodyMotion
 from harness.experiment import CalibrationSession, Playback, prepare_playback
 from harness.reconstruct import Session, make_method
 from harness.simulate import simulate_loop
-from harness.stream import TrackerFrame
-from harness.stream.is900 import serve_emulator
+from harness.stream import TrackerFrame, serve_emulator
 from harness.stream.recording import RecordingStream
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness

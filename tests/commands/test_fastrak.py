@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from harness.stream.fastrak import Fastrak, FastrakConfig, FastrakEmulator, FastrakEmulatorConfig, serve_fastrak
+from harness.stream import serve_emulator
+from harness.stream.fastrak import Fastrak, FastrakConfig, FastrakEmulator, FastrakEmulatorConfig
 from harness.stream.polhemus import LineEmulator
+from harness.stream.recording import RecordingWriter
 from tests.command import Command
 from tests.stream.is900.driver.bench import make_samples
 
@@ -57,9 +59,9 @@ def test_emulate_refuses_what_no_fastrak_has(flags: str, message: str, command: 
 
 def test_a_device_is_recorded_and_replayed(tmp_path: Path, command: Command) -> None:
     link, file = tmp_path / "port", tmp_path / "one.rec"
-    with serve_fastrak(make_samples(2, 60.0), pty=link):
+    with serve_emulator(make_samples(2, 60.0), FastrakEmulatorConfig(), pty=link):
         said = command("record", f"fastrak:{link}", file, "--seconds", "1", "--stations", "left,right")
-        assert "OutputCompensat CPG2030-003-10 at fastrak:" in said.err
+        assert "FASTRAK, firmware 3.02 at fastrak:" in said.err
         sent = command("record", f"fastrak:{link}", tmp_path / "two.rec", "--send", "S", "--send", "P").out
         with Fastrak(str(link), FastrakConfig(rate_hz=60.0)) as tracker:
             assert next(iter(tracker)).position_valid.all()
@@ -68,6 +70,25 @@ def test_a_device_is_recorded_and_replayed(tmp_path: Path, command: Command) -> 
     replayed = command("replay", file, "--json").content
     assert list(replayed["stations"]) == ["left", "right"]
     assert "no stretch in which a station rests" in command("characterize", file, code=2).err
+    said = command("inspect", file)
+    assert said.lines[0] == f"{file}: a recording of a FASTRAK at 60 Hz, items 2,11,1 in binary"
+    assert any(line.startswith("right ") for line in said.lines)
+    assert f"next: harness replay {file}" in said.err
+    assert "--unit with one.rec" in command("inspect", file, "--unit", "mm", code=2).err
+    assert command("inspect", tmp_path / "two.rec").lines[0].endswith(" a FASTRAK at 60 Hz, items 2,4,1 in ASCII")
+
+
+def test_a_recording_of_stretches_is_inspected(tmp_path: Path, command: Command) -> None:
+    file = tmp_path / "lab.rec"
+    command("record", "sim:lab", file, "--seconds", "3")
+    said = command("inspect", file, "--json")
+    assert said.content["recording"].startswith(f"{file}: a recording of an IS-900 at ")
+    assert said.content["stretches"][0] == "static"
+    assert f"harness characterize {file}" in said.out
+    with RecordingWriter(tmp_path / "sent.rec") as writer:
+        writer.on_sent(b"S", 0.0, 0.0)
+        writer.on_answer({"command": "S", "received": "", "answers": []})
+    assert "a recording of 1 command and their answers" in command("inspect", tmp_path / "sent.rec").lines[0]
 
 
 @pytest.mark.parametrize("flag", ["--quality mp", "--boresight", "--keep-settings", "--alignment 0,0,0,1,0,0,0,1,0"])

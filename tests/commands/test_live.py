@@ -18,7 +18,7 @@ import pytest
 
 from harness.experiment import Playback, prepare_playback
 from harness.reconstruct import make_method
-from harness.stream.is900 import serve_emulator
+from harness.stream import serve_emulator
 from harness.view import COMMAND_HEADER
 from tests.command import Command
 from tests.interrupts import interrupt, start_harness

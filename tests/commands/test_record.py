@@ -16,8 +16,8 @@ import pytest
 
 from harness.experiment import Playback
 from harness.experiment.scenarios import find_scenario
-from harness.stream import FRAME_COLUMNS
-from harness.stream.is900 import DriverConfig, Is900, serve_emulator
+from harness.stream import FRAME_COLUMNS, serve_emulator
+from harness.stream.is900 import DriverConfig, Is900
 from harness.stream.polhemus import EmulatorConfig, open_transport
 from harness.stream.recording import (
     CONFIGURED,

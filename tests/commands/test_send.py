@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.stream.is900 import serve_emulator
+from harness.stream import serve_emulator
 from harness.stream.polhemus import EmulatorConfig, EmulatorServer
 from harness.stream.recording import RecordingStream, read_recording
 from tests.command import Command, Said

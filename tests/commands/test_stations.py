@@ -7,7 +7,7 @@ import pytest
 
 from harness.commands.flags import parse_station_map
 from harness.errors import HarnessError
-from harness.stream.is900 import serve_emulator
+from harness.stream import serve_emulator
 from harness.stream.recording import RecordingStream
 from tests.command import Command
 from tests.stream.is900.driver.bench import make_samples

@@ -186,11 +186,30 @@ def test_another_motion_is_refused(other: dict[str, str], simulated: Path) -> No
         score_methods(stream, find_playback(stream, scenario="demo", **other), ["ik:previous"])  # type: ignore[arg-type]
 
 
-def test_records_without_time_stamps_are_refused(played: Playback, tmp_path: Path) -> None:
-    """As those of a FASTRAK."""
-    stream = RecordingStream(emulated(played, tmp_path / "a.rec", [1.0], items=(40, 2, 11, 1)))
-    with pytest.raises(BadInput, match=r"no time stamps, so that no frame can be found .*`harness validate`"):
-        score_methods(stream, played, ["ik:previous"])
+def test_records_without_time_stamps_are_found_by_their_positions(played: Playback, tmp_path: Path) -> None:
+    """As those of a FASTRAK, through more than a loop."""
+    seconds = [played.samples.loop_s + 3.0]
+    stamped = RecordingStream(emulated(played, tmp_path / "a.rec", seconds, items=(40, 2, 11, 21, 1)))
+    bare = RecordingStream(emulated(played, tmp_path / "b.rec", seconds, items=(40, 2, 11, 1)))
+    known, found = recorded_take(stamped, played), recorded_take(bare, played)
+    assert len(found.loops) == len(known.loops) == 2
+    for one, other in zip(found.loops, known.loops, strict=True):
+        rows, here, there = np.intersect1d(one.rows, other.rows, return_indices=True)
+        assert len(rows) > 0.98 * len(other.rows)
+        off = (one.index[here] - other.index[there]).tolist()
+        assert set(off) <= {-1, 0, 1}
+        assert off.count(0) > 0.9 * len(off)
+    assert found.has_records
+
+
+def test_another_motion_without_time_stamps_is_refused(played: Playback, tmp_path: Path) -> None:
+    stream = RecordingStream(emulated(played, tmp_path / "a.rec", [2.0], items=(40, 2, 11, 1)))
+    other = find_playback(stream, scenario="demo", clip="walking_p1_01")
+    with pytest.raises(BadInput, match="of another motion"):
+        score_methods(stream, other, ["ik:previous"])
+    lost = RecordingStream(emulated(played, tmp_path / "b.rec", [1.0], items=(40, 11, 1)))
+    with pytest.raises(BadInput, match="of another motion"):
+        score_methods(lost, played, ["ik:previous"])
 
 
 def test_names_that_do_not_exist_are_refused(played: Playback, simulated: Path, tmp_path: Path) -> None:

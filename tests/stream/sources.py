@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from harness.experiment import Playback
+from harness.stream.emulators import serve_emulator
 from harness.stream.frame import TrackerFrame
 from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
-from harness.stream.is900.emulator.emulator import serve_emulator
 from harness.stream.polhemus.codec.reader import ByteCapture, FrameReader, WireFormat
 from harness.stream.polhemus.codec.samples import DeviceSamples
 from harness.stream.recording.recording import RecordingWriter, record_capture

@@ -10,8 +10,8 @@ import pytest
 
 from harness.experiment import Playback, prepare_playback
 from harness.reconstruct import list_methods, make_method
+from harness.stream.emulators import serve_emulator
 from harness.stream.is900.driver.is900 import Is900
-from harness.stream.is900.emulator.emulator import serve_emulator
 from harness.stream.polhemus.codec.reader import ByteCapture, WireFormat
 from harness.stream.polhemus.codec.records import RecordValues, encode_records
 from harness.stream.recording.recording import RecordingWriter

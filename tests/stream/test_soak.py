@@ -15,14 +15,15 @@ import numpy as np
 import pytest
 
 from harness.experiment import prepare_playback
+from harness.stream.emulators import serve_emulator
 from harness.stream.frame import TrackerFrame
 from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
-from harness.stream.is900.emulator.emulator import serve_emulator
 from harness.stream.line_events import LineEvent
 from harness.stream.polhemus.codec.items import STANDARD_LIST, STATION_CHARACTERS, record_type
 from harness.stream.polhemus.codec.records import RecordFormat
-from harness.stream.polhemus.driver.transport import LineLost, open_transport
+from harness.stream.polhemus.driver.open_transport import open_transport
+from harness.stream.polhemus.driver.transport import LineLost
 from harness.stream.polhemus.emulator.config import EmulatorConfig
 from harness.stream.polhemus.emulator.device_state import SentMessage
 from harness.stream.polhemus.emulator.pty_port import PtyPort

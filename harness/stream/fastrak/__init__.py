@@ -6,8 +6,8 @@ from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
     from harness.stream.fastrak.driver import Fastrak, FastrakConfig
-    from harness.stream.fastrak.emulator import FastrakEmulator, FastrakEmulatorConfig, serve_fastrak
+    from harness.stream.fastrak.emulator import FastrakEmulator, FastrakEmulatorConfig
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
-__all__ = ["Fastrak", "FastrakConfig", "FastrakEmulator", "FastrakEmulatorConfig", "serve_fastrak"]
+__all__ = ["Fastrak", "FastrakConfig", "FastrakEmulator", "FastrakEmulatorConfig"]

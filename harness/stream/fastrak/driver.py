@@ -1,22 +1,21 @@
 """A real FASTRAK as a `TrackerStream`."""
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import ClassVar
 
-from harness.core.network import FASTRAK_PREFIX
 from harness.errors import BadInput
 from harness.stream.fastrak.items import FASTRAK_ITEMS, FASTRAK_LIST
-from harness.stream.line_events import LineEvent, LineObserver
 from harness.stream.polhemus.codec import commands
 from harness.stream.polhemus.codec.commands import station_command
 from harness.stream.polhemus.codec.items import MOST_DEVICE_HZ, DeviceFamily
 from harness.stream.polhemus.codec.reader import WireFormat
 from harness.stream.polhemus.codec.records import RecordFormat
-from harness.stream.polhemus.codec.replies import OutputList, StationStates, StatusRecord
-from harness.stream.polhemus.driver.config import DriverTiming, LineConfig, join_commas
-from harness.stream.polhemus.driver.connection import DeviceConnection, Host
+from harness.stream.polhemus.codec.replies import GeometryReply, OutputList, StationStates, StatusRecord
+from harness.stream.polhemus.driver.config import LineConfig, join_commas
+from harness.stream.polhemus.driver.connection import DeviceConnection
 from harness.stream.polhemus.driver.line_tracker import LineTracker
 from harness.stream.polhemus.driver.rate import (
     check_requested_rate,
@@ -64,25 +63,10 @@ class Fastrak(LineTracker):
     config: FastrakConfig
     _config_type = FastrakConfig
     _states_query = ALL_STATES
-
-    def __init__(
-        self,
-        port: str,
-        config: FastrakConfig | None = None,
-        *,
-        observer: LineObserver | None = None,
-        on_event: Callable[[LineEvent], None] = lambda event: None,
-        timing: DriverTiming | None = None,
-        host: Host | None = None,
-    ) -> None:
-        """Open and set up the tracker at `fastrak:/dev/ttyUSB0`; the prefix may be left out here.
-
-        `observer` receives all bytes and events, `on_event` the events only. Both are called in the thread that
-        iterates.
-        """
-        self._lists: dict[str, tuple[int, ...]] = {}
-        name = FASTRAK_PREFIX + port.removeprefix(FASTRAK_PREFIX)
-        super().__init__(name, config, observer=observer, on_event=on_event, timing=timing, host=host)
+    _lists: Mapping[str, tuple[int, ...]] = MappingProxyType({})
+    """Output list of each station that told it, before the session."""
+    _increments: Mapping[str, tuple[float, ...]] = MappingProxyType({})
+    """Increment of each station that has one, before the session, in the device's unit."""
 
     @property
     def setup_note(self) -> str:
@@ -97,11 +81,16 @@ class Fastrak(LineTracker):
         return fallback if states is None else "".join(states.stations)
 
     def _read_settings(self) -> None:
-        """Read the lists of the stations, which a session changes. Old firmware may not tell them."""
-        for station in self._stations.characters:
-            reply = self._line.ask(station_command("O", station), OutputList, self._timing.answer_s)
-            if reply is not None and reply.station == station:
-                self._lists[station] = reply.items
+        """Read the lists and increments of the stations, which a session changes. Old firmware may not tell them."""
+        stations = self._stations.characters
+        queries = b"".join(station_command(letter, station) for station in stations for letter in "OI")
+        replies = self._line.collect(queries, 2 * len(stations))
+        self._lists = {reply.station: reply.items for reply in replies if isinstance(reply, OutputList)}
+        told = [reply for reply in replies if isinstance(reply, GeometryReply) and reply.letter == "I"]
+        self._increments = {reply.station: reply.values for reply in told if any(reply.values)}
+        if self._increments:
+            text = f"station {', '.join(self._increments)} had an increment, which holds records back"
+            self._report("settings", f"{text}: 0 for this session, then put back")
 
     def _configure(self, status: StatusRecord, previous_hz: float | None) -> WireFormat:
         stations, line = self._stations, self._line
@@ -144,6 +133,8 @@ class Fastrak(LineTracker):
         line.send(commands.CENTIMETRES if self.config.centimetres else commands.INCHES)
         for station in wire.characters.decode():
             line.send(station_command("O", station, wire.items))
+        for station in self._increments:
+            line.send(station_command("I", station, (0,)))
 
     def _differences(self, wire: WireFormat) -> str:
         """Describe where the device differs from the configuration; empty when it agrees."""
@@ -171,6 +162,8 @@ class Fastrak(LineTracker):
                 line.send(station_command("O", station, items))
             self._restore_stations(line)
             line.send(commands.CENTIMETRES if self._status.centimetres else commands.INCHES)
+            for station, distance in self._increments.items():
+                line.send(station_command("I", station, distance, 2))
             line.send(commands.BINARY if self._status.binary else commands.ASCII)
             # A port that is closed may drop bytes that have not left it, so wait until the device has answered.
             line.ask(commands.STATUS, StatusRecord, self._timing.answer_s)

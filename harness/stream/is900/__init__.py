@@ -8,8 +8,8 @@ if TYPE_CHECKING:
     from harness.stream.is900.driver.config import DriverConfig
     from harness.stream.is900.driver.is900 import Is900, open_tracker
     from harness.stream.is900.emulator.device import Device
-    from harness.stream.is900.emulator.emulator import Emulator, serve_emulator
+    from harness.stream.is900.emulator.emulator import Emulator
 else:
     __getattr__, __dir__ = lazy_names(__name__)
 
-__all__ = ["Device", "DriverConfig", "Emulator", "Is900", "open_tracker", "serve_emulator"]
+__all__ = ["Device", "DriverConfig", "Emulator", "Is900", "open_tracker"]

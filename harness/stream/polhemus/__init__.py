@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
-    from harness.stream.polhemus.driver.transport import open_transport
+    from harness.stream.polhemus.driver.open_transport import open_transport
     from harness.stream.polhemus.emulator.config import EmulatorConfig
     from harness.stream.polhemus.emulator.device_state import SentMessage
     from harness.stream.polhemus.emulator.emulator import LineEmulator

@@ -15,7 +15,7 @@ from harness.stream.polhemus.driver.connection import (
     DeviceConnection,
     Host,
     NoAnswer,
-    candidate_baud_rates,
+    describe_device,
     detect_device,
 )
 from harness.stream.polhemus.driver.exchange import Answer, exchange, read_wire_format
@@ -99,9 +99,9 @@ def record_commands(
 
     exchanges: list[Answer] = []
     streaming = False
-    detected = detect_device(port, candidate_baud_rates(port, config), connect, used_timing.answer_s)
+    detected = detect_device(port, config, connect, used_timing.answer_s)
     line = detected.line
-    log(f"{detected.status.identification or 'a device'} at {port}, firmware {detected.status.firmware}")
+    log(f"{describe_device(detected.status, config.family)} at {port}")
     try:
         with suppress(KeyboardInterrupt):
             wire: WireFormat | None = None

@@ -87,7 +87,7 @@ def capture_stretches(
         open_tracker_at(port, config, observer=writer, on_event=events) as device,
         closing(_frames(device, path)) as frames,
     ):
-        log(f"{device.identification or 'a device'} at {port}; stations {device.station_list}")
+        log(f"{device.identification} at {port}; stations {device.station_list}")
         writer.on_mark({"stretch": ""})  # ends one that was cut
         for stretch in missing:
             _record_stretch(frames, device, writer, stretch, ready, log, progress)

@@ -22,7 +22,7 @@ from harness.stream.polhemus.driver.connection import (
     DeviceConnection,
     Host,
     NoAnswer,
-    candidate_baud_rates,
+    describe_device,
     detect_device,
 )
 from harness.stream.polhemus.driver.exchange import read_wire_format
@@ -96,13 +96,12 @@ class _LineServer:
     def open(self) -> ClientPty:
         """Find the device, and open the pty. Raises BadInput."""
         check_link_is_free(self._link)
-        bauds = candidate_baud_rates(self._port, self._config)
-        detected = detect_device(self._port, bauds, self._connect, DriverTiming().answer_s)
+        detected = detect_device(self._port, self._config, self._connect, DriverTiming().answer_s)
         self._use(detected.line)
         self._baud = detected.baud
         with defer_interrupts():
             self._pty = pty = ClientPty(self._link, detected.baud)
-        name = detected.status.identification.strip() or "a device"
+        name = describe_device(detected.status, self._config.family)
         self._log(f"{name} at {self._port} is recorded; another program may use it at {self._link}")
         self._log("Ctrl-C ends the recording")
         return pty

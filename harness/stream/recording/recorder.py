@@ -1,5 +1,6 @@
 """Recording of a device until told to stop, or between two moments of a session."""
 
+import math
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -130,15 +131,18 @@ def record_port(
     counts: dict[str, int] = {}
     events = EventCounter(log)
     with _count_interrupt(counts), open_tracker_at(port, config, observer=writer, on_event=events) as device:
-        name = device.identification or "a device"
-        log(f"{name} at {port}; stations {device.station_list}; Ctrl-C ends the recording")
+        log(f"{device.identification} at {port}; stations {device.station_list}; Ctrl-C ends the recording")
         log(device.setup_note)
         end = threading.Timer(seconds or 0.0, device.close)
         if seconds is not None:
             end.start()
         try:
-            reported_s = -PROGRESS_INTERVAL_S
+            reported_s, until_s = -PROGRESS_INTERVAL_S, math.inf
             for frame in device:
+                if seconds is not None:  # a VRPN server is heard for a second before the stream begins
+                    until_s = min(until_s, frame.received_s + seconds)
+                if frame.received_s >= until_s:
+                    break
                 if frame.received_s - reported_s >= PROGRESS_INTERVAL_S:
                     reported_s = frame.received_s
                     progress(_progress_text(device, frame, writer))

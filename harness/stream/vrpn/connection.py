@@ -11,9 +11,8 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
-from harness.core.network import VRPN_PREFIX, resolve_host
+from harness.core.network import VRPN_PREFIX, connect_tcp, describe_network_error, resolve_host
 from harness.errors import BadInput, HarnessError, shorten
 from harness.stream.vrpn.messages import (
     COOKIE,
@@ -176,26 +175,19 @@ def _gone(error: OSError | ValueError) -> ConnectionLost:
 
 
 def _connect(address: TrackerAddress, timeout_s: float) -> socket.socket:
-    """A connection to the first address of the host that answers; ConnectionLost with the first reason if none does."""
-    reasons = []
-    for family, place in _resolve(address, socket.SOCK_STREAM):
-        opened = socket.socket(family, socket.SOCK_STREAM)
-        opened.settimeout(timeout_s)
-        try:
-            opened.connect(place)
-        except OSError as error:
-            opened.close()
-            refused = isinstance(error, ConnectionRefusedError)
-            reason = f"nothing listens at {address.host}, port {address.port}" if refused else str(error)
-            reasons.append(f"{address.host} does not answer" if isinstance(error, TimeoutError) else reason)
-        else:
-            return _prepare(opened, timeout_s)
-    raise ConnectionLost(reasons[0])
+    """A connection to the first address of the host that answers; ConnectionLost with the reason if none does."""
+    try:
+        return _prepare(connect_tcp(address.host, address.port, timeout_s), timeout_s)
+    except (OSError, UnicodeError) as error:
+        raise ConnectionLost(describe_network_error(error, address.host, address.port)) from error
 
 
 def _be_connected(address: TrackerAddress, timeout_s: float) -> socket.socket:
     """The connection that the server makes to this computer when a packet asks it to. Raises ConnectionLost."""
-    family, place = _resolve(address, socket.SOCK_DGRAM)[0]
+    try:
+        family, place = resolve_host(address.host, address.port, socket.SOCK_DGRAM)[0]
+    except (OSError, UnicodeError) as error:
+        raise ConnectionLost(describe_network_error(error, address.host, address.port)) from error
     with socket.socket(family, socket.SOCK_DGRAM) as asking:
         try:
             asking.connect(place)
@@ -214,15 +206,7 @@ def _be_connected(address: TrackerAddress, timeout_s: float) -> socket.socket:
             raise ConnectionLost(f"{address.host} cannot be asked ({error.strerror or error})") from error
 
 
-def _resolve(address: TrackerAddress, kind: socket.SocketKind) -> list[tuple[socket.AddressFamily, Any]]:
-    try:
-        return resolve_host(address.host, address.port, kind)
-    except (OSError, UnicodeError) as error:
-        raise ConnectionLost(f"there is no host called {address.host}") from error
-
-
 def _prepare(opened: socket.socket, timeout_s: float) -> socket.socket:
     opened.settimeout(timeout_s)
-    opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     opened.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET_ON_CLOSE)
     return opened

@@ -14,28 +14,24 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from harness.core.network import LOOPBACK, check_loopback, parse_address, resolve_host
+from harness.core.network import LOOPBACK, check_loopback
 from harness.core.number_format import count_noun
-from harness.errors import BadInput, shorten
+from harness.stream.client_socket import MAX_CLIENTS
+from harness.stream.vrpn.listening import open_listeners, parse_served_name
 from harness.stream.vrpn.messages import (
-    COOKIE,
     DEFAULT_PORT,
-    MAX_NAME_BYTES,
     PING,
     PONG,
     POSE,
     SENDER_DESCRIPTION,
     TYPE_DESCRIPTION,
     MalformedMessage,
-    MessageReader,
-    NameTable,
     PoseReport,
     VrpnMessage,
     encode_description,
 )
+from harness.stream.vrpn.served_client import ServedClient
 
-MAX_CLIENTS = 32
-"""Further clients are turned away."""
 MAX_UNREAD_BYTES = 8 << 20
 """A client that leaves so much unread is disconnected: it would otherwise miss reports without noticing [bytes]."""
 DRAIN_S = 2.0
@@ -45,19 +41,8 @@ _READ_BYTES = 1 << 16
 _LONGEST_REQUEST_BYTES = 200
 _LEAST_PORT = 1024
 """Least port that a request may name: those below belong to the system."""
-_TRIES = 16
-"""Free TCP ports that are tried until the UDP port of the same number is free too."""
 
 LogCallback = Callable[[str], None]
-
-
-def parse_served_name(text: str) -> tuple[str, str, int]:
-    """Name, host and port of `NAME[@[HOST:]PORT]`; this computer and VRPN's port by default. Raises BadInput."""
-    name, at, place = text.partition("@")
-    host, port = parse_address(place, LOOPBACK) if at else (LOOPBACK, DEFAULT_PORT)
-    if not name or not name.isprintable() or len(name.encode()) >= MAX_NAME_BYTES // 2:
-        raise BadInput(f"--vrpn {shorten(text)}: no name of a tracker.", "Write NAME[@HOST:PORT], such as Tracker0.")
-    return name, host, port
 
 
 def open_server(
@@ -83,10 +68,10 @@ class VrpnServer:
         """Listen; port 0 takes a free one. Raises BadInput for a port in use, or reachable without `anywhere`."""
         check_loopback(host, anywhere, "anyone who reaches the port then sees the poses")
         self.trackers, self._log = tuple(trackers), log
-        self._clients: list[_Client] = []
+        self._clients: list[ServedClient] = []
         self._lock = threading.Lock()
         """Held while the clients or what they have to be sent change."""
-        self._tcp, self._udp = _listen(host, port)
+        self._tcp, self._udp = open_listeners(host, port)
         self.port = int(self._tcp.getsockname()[1])
         self._woken, self._waker = socket.socketpair()
         self._woken.setblocking(False)
@@ -170,14 +155,14 @@ class VrpnServer:
             self._accept()
         if self._udp in ready:
             self._answer_request()
-        for client in [end for end in ready if isinstance(end, _Client)]:
+        for client in [end for end in ready if isinstance(end, ServedClient)]:
             self._read(client)
         with self._lock:
             for client in free:
                 client.flush()
             for client in self._clients:
-                if client.unsent_bytes > MAX_UNREAD_BYTES:
-                    client.gone = f"it left {client.unsent_bytes >> 20} MB unread"
+                if len(client.unsent) > MAX_UNREAD_BYTES:
+                    client.gone = f"it left {len(client.unsent) >> 20} MB unread"
             gone = [client for client in self._clients if client.gone]
             self._clients = [client for client in self._clients if not client.gone]
         for client in gone:
@@ -215,9 +200,9 @@ class VrpnServer:
             self._log(f"VRPN client {place[0]} is turned away: {count_noun(MAX_CLIENTS, 'client')} are there")
             return
         with self._lock:
-            self._clients.append(_Client(opened, place))
+            self._clients.append(ServedClient(opened, place))
 
-    def _read(self, client: "_Client") -> None:
+    def _read(self, client: ServedClient) -> None:
         """Process what a client sends: its names, and pings, which are answered."""
         try:
             for message in client.messages():
@@ -233,10 +218,10 @@ class VrpnServer:
                             client.add(pong)
         except MalformedMessage as error:
             client.gone = f"it sent what is no message of VRPN: {error.problem}"
-        if client.has_cookie and not client.greeted and not client.gone:
+        if client.reader.greeted and not client.greeted and not client.gone:
             self._greet(client)
 
-    def _greet(self, client: "_Client") -> None:
+    def _greet(self, client: ServedClient) -> None:
         """Describe the trackers and types to a client; from now on it gets the reports."""
         now_us = _now_us()
         names = [(SENDER_DESCRIPTION, number, name) for number, name in enumerate(self.trackers)]
@@ -248,101 +233,5 @@ class VrpnServer:
         self._log(f"VRPN client {client.name} is connected")
 
 
-class _Client:
-    """A connection to a client. It never blocks."""
-
-    def __init__(self, opened: socket.socket, place: Any) -> None:
-        opened.setblocking(False)
-        opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self.place, self.name = place, f"{place[0]}:{place[1]}"
-        self.senders, self.types = NameTable(), NameTable()
-        self.greeted = False
-        """Whether names were described to it, so that it gets reports."""
-        self.gone = ""
-        """Why it is disconnected; "" while it is not."""
-        self._socket, self._reader, self._sequence = opened, MessageReader(), 0
-        self.unsent = bytearray(COOKIE)
-
-    @property
-    def has_cookie(self) -> bool:
-        """Whether its cookie has arrived."""
-        return self._reader.greeted
-
-    @property
-    def unsent_bytes(self) -> int:
-        """Number of bytes that it left no room for."""
-        return len(self.unsent)
-
-    def fileno(self) -> int:
-        return self._socket.fileno()
-
-    def add(self, *messages: VrpnMessage) -> None:
-        """Send messages as soon as the client takes them."""
-        for message in messages:
-            self.unsent += message.encode(self._sequence)
-            self._sequence += 1
-
-    def flush(self) -> None:
-        """Send as many of the waiting bytes as the client takes."""
-        try:
-            while self.unsent:
-                del self.unsent[: self._socket.send(self.unsent)]
-        except BlockingIOError:
-            pass
-        except OSError as error:
-            self.gone = self.gone or str(error.strerror or error)
-
-    def messages(self) -> Iterable[VrpnMessage]:
-        """Yield what has arrived. Raises MalformedMessage."""
-        try:
-            data = self._socket.recv(_READ_BYTES)
-        except BlockingIOError:
-            return
-        except OSError as error:
-            self.gone = str(error.strerror or error)
-            return
-        if not data:
-            self.gone = "it has closed the connection"
-            return
-        yield from self._reader.feed(data)
-
-    def close(self) -> None:
-        self._socket.close()
-
-
 def _now_us() -> int:
     return time.time_ns() // 1000
-
-
-def _listen(host: str, port: int) -> tuple[socket.socket, socket.socket]:
-    """Sockets that listen for TCP and UDP at one port. Raises BadInput."""
-    for _ in range(0 if port else _TRIES):
-        with contextlib.suppress(OSError):
-            return _bind(host, 0)
-    try:
-        return _bind(host, port)
-    except (OSError, UnicodeError) as error:
-        raise _bind_error(host, port, error) from error
-
-
-def _bind(host: str, port: int) -> tuple[socket.socket, socket.socket]:
-    family, place = resolve_host(host, port, socket.SOCK_STREAM)[0]
-    with contextlib.ExitStack() as opened:
-        tcp = opened.enter_context(socket.socket(family, socket.SOCK_STREAM))
-        tcp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        tcp.bind(place)
-        udp = opened.enter_context(socket.socket(family, socket.SOCK_DGRAM))
-        udp.bind((place[0], tcp.getsockname()[1], *place[2:]))
-        tcp.listen(MAX_CLIENTS)
-        tcp.setblocking(False)
-        udp.setblocking(False)
-        opened.pop_all()
-    return tcp, udp
-
-
-def _bind_error(host: str, port: int, error: Exception) -> BadInput:
-    if getattr(error, "errno", None) == errno.EADDRINUSE:
-        advice = "Close that program, or name another port: --vrpn NAME@127.0.0.1:3884."
-        return BadInput(f"VRPN at {host}:{port}: another program listens there.", advice)
-    reason = getattr(error, "strerror", None) or error
-    return BadInput(f"VRPN at {host}:{port}: {reason}.", "Name an address of this computer, such as 127.0.0.1:3883.")

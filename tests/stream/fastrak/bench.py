@@ -25,4 +25,4 @@ def fastrak_bench(*faults: Fault, stations: int = 3, rate_hz: float = 40.0, **co
 
 def open_fastrak(bench: Bench, config: FastrakConfig | None = None, observer: LineObserver | None = None) -> Fastrak:
     """The driver of the device on the bench."""
-    return Fastrak("bench", config, on_event=bench.events.append, host=bench.host, observer=observer)
+    return Fastrak(bench.port, config, on_event=bench.events.append, host=bench.host, observer=observer)

@@ -68,12 +68,14 @@ def test_the_rate_is_measured_where_it_is_another() -> None:
 
 def test_the_device_gets_its_settings_back() -> None:
     bench = fastrak_bench()
-    device_of(bench).receive(b"O2,4,2,1\rU", bench.now_s)
+    device_of(bench).receive(b"O2,4,2,1\rUI2,1.5\r", bench.now_s)
     found = device_of(bench).settings
     with open_fastrak(bench, FastrakConfig(stations=("a", "b"))) as driver:
         frames_for(driver, bench, 0.5)
         during = device_of(bench).settings
         assert during.station("2").items == (2, 11, 1)
+        assert during.station("2").increment_m == 0.0
+        assert "station 2 had an increment" in bench.events[0].text
         assert during.centimetres
         assert during.binary
         assert not during.station("3").active, "it would load the line"
@@ -81,6 +83,12 @@ def test_the_device_gets_its_settings_back() -> None:
     assert device_of(bench).settings == found
     assert not device_of(bench).streaming
     assert b"M" not in bench.sent, "commands of InterSense"
+
+
+def test_the_driver_says_what_the_device_is() -> None:
+    """`S` has the text of `X` in place of a name."""
+    with open_fastrak(fastrak_bench()) as driver:
+        assert driver.identification == "FASTRAK, firmware 3.02"
 
 
 def test_a_device_that_was_reset_is_set_up_again() -> None:

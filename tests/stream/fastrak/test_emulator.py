@@ -29,6 +29,17 @@ def test_records_have_the_layout_of_the_manual() -> None:
     assert device.send(b"O1,5,6,7,1\rFP") == (b"01  0.0000 1.0000 0.0000-1.0000 0.0000 0.0000 0.0000 0.0000 1.0000\r\n")
 
 
+def test_extended_precision_has_an_exponent() -> None:
+    """`3(Sx.xxxxxESxxb)` of the manual, revision G, page 59."""
+    device = FastrakSession(1)
+    position = b" 3.93701E+01 -1.96850E+01  5.90551E+01 "
+    assert device.send(b"O1,52,50,54,51\rP") == b"01 " + position + b"  9.00000E+01 -0.00000E+00  0.00000E+00 \r\n"
+    assert device.send(b"O1,52,4,1\rP") == b"01 " + position + b"  90.00  -0.00   0.00\r\n"
+    binary = device.send(b"fO1,2,11,1\rP")
+    assert device.send(b"O1,52,61,51\rP") == binary
+    assert b" EC -3*" in device.send(b"O1,2,52,1\r"), "the position twice"
+
+
 def test_the_status_has_the_layout_of_the_manual() -> None:
     """Firmware of 2012 has the tag `F3` and the map of the receivers; older firmware has blanks."""
     assert FastrakSession(3).send(b"S") == b"21S3F0         3.02  OutputCompensat CPG2030-003-10  \r\n"
@@ -50,6 +61,44 @@ def test_lengths_in_commands_have_the_unit_of_records() -> None:
     device.send(b"A2,100,0,0,200,0,0,100,100,0\r")
     assert device.send(b"A2\r")[:24] == b"22A 100.00   0.00   0.00"
     assert device.send(b"UA2\r")[:24] == b"22A  39.37   0.00   0.00"
+
+
+@pytest.mark.parametrize(
+    ("hemisphere", "sign"),
+    [("1,0,0", 1), ("-1,0,0", -1), ("0,0,1", 1), ("0,0,-1", -1), ("0,1,0", -1), ("0.1,1,0", -1), ("0,0,0", 1)],
+)
+def test_signs_flip_outside_the_hemisphere(hemisphere: str, sign: int) -> None:
+    """The station is at (1, -0.5, 1.5) m; its orientation stays."""
+    device = FastrakSession(1)
+    device.send(f"uH1,{hemisphere}\r".encode())
+    position = "".join(f"{sign * value:7.2f}" for value in (100.0, -50.0, 150.0)).encode()
+    assert device.send(b"P") == b"01 " + position + b"  90.00  -0.00   0.00\r\n"
+    device.send(b"A1,0,0,0,0,100,0,-100,0,0\r")  # the alignment comes after it
+    turned = "".join(f"{sign * value:7.2f}" for value in (-50.0, -100.0, 150.0)).encode()
+    assert device.send(b"P")[3:24] == turned
+
+
+def test_a_real_device_begins_with_the_forward_hemisphere() -> None:
+    device = FastrakSession(1, FastrakEmulatorConfig(hemisphere=(-1.0, 0.0, 0.0)))
+    assert device.send(b"H1\r") == b"21H  -1.00   0.00   0.00\r\n"
+    assert device.send(b"P")[3:10] == b" -39.37"
+    assert FastrakSession(1).send(b"H1\r") == b"21H   0.00   0.00   0.00\r\n"
+
+
+def test_an_increment_holds_records_back() -> None:
+    """The stations move along X by 1 mm a reading."""
+    device = FastrakSession(2)
+    device.send(b"uI1,0.45\rI2,1\r")
+    assert device.send(b"I1\rUI1\r") == b"21I   0.45\r\n21I   0.18\r\n"
+    records = (device.send(b"uC") + device.wait(0.5)).splitlines()
+    tens = {c: [float(line[3:10]) for line in records if line[1:2] == c] for c in (b"1", b"2")}
+    for station, step in ((b"1", 0.5), (b"2", 1.0)):
+        assert len(tens[station]) > 1
+        np.testing.assert_allclose(np.diff(tens[station]), step, atol=0.011)
+    assert len(device.send(b"cP").splitlines()) == 2, "a poll has every station"
+    device.send(b"I1,0\rI2,0\r")
+    rates = [line[1:2] for line in (device.send(b"C") + device.wait(0.5)).splitlines()]
+    assert rates.count(b"1") > 2 * len(tens[b"1"])
 
 
 def test_boresight_turns_all_of_an_orientation() -> None:
@@ -77,7 +126,8 @@ def test_stations_are_switched_and_told() -> None:
         (b"MS\r", -99),  # commands of InterSense
         (b"MZ\r", -99),
         (b"l*\r", -3),
-        (b"I1\r", -99),  # not stored
+        (b"Q1\r", -99),  # not stored
+        (b"I1,-1\r", -3),
     ],
 )
 def test_what_only_an_is900_has_is_refused(command: bytes, code: int) -> None:

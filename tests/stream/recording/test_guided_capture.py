@@ -15,10 +15,10 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadFile
+from harness.stream.emulators import serve_emulator
 from harness.stream.frame import TrackerFrame
 from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
-from harness.stream.is900.emulator.emulator import serve_emulator
 from harness.stream.polhemus.codec.samples import DeviceSamples
 from harness.stream.recording import guided_capture
 from harness.stream.recording.guided_capture import Stretch, capture_stretches, finished_stretches

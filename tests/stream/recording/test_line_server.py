@@ -11,9 +11,9 @@ import pytest
 import serial
 
 from harness.experiment import Playback, prepare_playback
+from harness.stream.emulators import serve_emulator
 from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
-from harness.stream.is900.emulator.emulator import serve_emulator
 from harness.stream.polhemus.emulator.pty_port import ABSENT_S, MAX_WAITING_BYTES, ClientPty
 from harness.stream.recording.line_server import serve_line
 from harness.stream.recording.recording import RecordingWriter, read_recording

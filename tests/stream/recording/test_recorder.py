@@ -1,5 +1,7 @@
 """A recording that is started and stopped while a device runs: each part can be replayed alone."""
 
+from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -7,10 +9,13 @@ import pytest
 
 from harness.errors import BadFile, BadInput
 from harness.experiment import Playback, prepare_playback
+from harness.stream.frame import TrackerFrame
 from harness.stream.line_events import LineEvent
+from harness.stream.recording import recorder
 from harness.stream.recording.recorder import RecordingSwitch
-from harness.stream.recording.recording import read_recording
+from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
+from harness.stream.vrpn import VrpnConfig
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +53,34 @@ def test_a_part_of_a_session_is_recorded(played: Playback, tmp_path: Path) -> No
     assert firsts == list(range(firsts[0], firsts[0] + len(frames)))
     assert firsts[0] > 0
     assert firsts[-1] < len(whole) - 1
+
+
+class _Device:
+    """A tracker whose first frames were received before it was open, as of a VRPN server."""
+
+    identification, station_list, setup_note, counts = "a tracker", "1 head", "", {"records": 100}
+
+    def __init__(self, frames: list[TrackerFrame]) -> None:
+        self.left = iter(frames)
+
+    def __iter__(self) -> Iterator[TrackerFrame]:
+        yield from self.left
+
+    def close(self) -> None: ...
+
+    def health(self) -> dict[str, float]:
+        return {"frames": 1.0, "out_of_range": 0.0}
+
+
+def test_seconds_count_from_the_first_frame(played: Playback, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    frames = played.simulation.frames[:200]
+    for seconds in (0.5, 1.0):
+        device = _Device(frames)
+        monkeypatch.setattr(recorder, "open_tracker_at", lambda *args, device=device, **kwargs: nullcontext(device))
+        with RecordingWriter(tmp_path / f"{seconds}.rec") as writer:
+            recorder.record_port("vrpn:a@b", VrpnConfig(), writer, seconds=seconds)
+        taken = [frame for frame in frames if frame.received_s < frames[0].received_s + seconds]
+        assert len(frames) - len(list(device.left)) == len(taken) + 1
 
 
 def test_starting_and_stopping_out_of_turn_is_refused(played: Playback, tmp_path: Path) -> None:

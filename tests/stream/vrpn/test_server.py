@@ -9,6 +9,7 @@ import pytest
 
 from harness.errors import BadInput
 from harness.stream.vrpn import server as server_module
+from harness.stream.vrpn.listening import parse_served_name
 from harness.stream.vrpn.messages import (
     COOKIE,
     PING,
@@ -18,7 +19,7 @@ from harness.stream.vrpn.messages import (
     VrpnMessage,
     encode_description,
 )
-from harness.stream.vrpn.server import VrpnServer, open_server, parse_served_name
+from harness.stream.vrpn.server import VrpnServer, open_server
 from tests.stream.vrpn.feeder import wait_until_closed
 
 REPORT = PoseReport(1, 1_700_000_000_000_007, (0.5, -1.0, 2.0), (0.5, 0.25, -0.25, 1.0))

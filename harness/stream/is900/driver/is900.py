@@ -15,8 +15,9 @@ from harness.stream.polhemus.codec.reader import WireFormat
 from harness.stream.polhemus.codec.replies import Emitter, StatusRecord
 from harness.stream.polhemus.driver.connection import DeviceConnection
 from harness.stream.polhemus.driver.line_tracker import LineTracker
+from harness.stream.polhemus.driver.network_transport import UDP_SCHEME
 from harness.stream.polhemus.driver.tracker import Tracker
-from harness.stream.polhemus.driver.transport import UDP_SCHEME, LineLost
+from harness.stream.polhemus.driver.transport import LineLost
 
 MAX_EMITTERS = 200
 """More emitters than any constellation has."""

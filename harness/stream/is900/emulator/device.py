@@ -4,6 +4,7 @@ It follows docs/is900.md on commands (3, 4), replies (6, 7), records (5) and the
 sources are silent it follows section 14.
 """
 
+from collections.abc import Callable
 from typing import ClassVar
 
 from harness.stream.is900.emulator.setting_commands import (
@@ -14,23 +15,21 @@ from harness.stream.is900.emulator.setting_commands import (
 )
 from harness.stream.polhemus.codec.replies import TrackingStatus, UnknownReply
 from harness.stream.polhemus.emulator.argument import CommandArgument
-from harness.stream.polhemus.emulator.device import CommandDevice, CommandTable, boresight_station
+from harness.stream.polhemus.emulator.device import CommandDevice, CommandTable, LineCommand, boresight_station
 from harness.stream.polhemus.emulator.device_state import DeviceState
 from harness.stream.polhemus.emulator.settings import STATION_NAMES
 
 
-def _zero_clock(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
+def _zero_clock(device: DeviceState, now_s: float) -> None:
     """Set the clock to zero. When polled, the motion starts again too, so that the following bytes are reproducible."""
-    argument.require_empty()
     if device.streaming:
         device.rounds.player.zero(now_s)
     else:
         device.rounds.player.begin(now_s)
 
 
-def _report_tracking(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
+def _report_tracking(device: DeviceState, now_s: float) -> None:
     """Report the state of each station and its ranges."""
-    argument.require_empty()
     quality = {name: device.rounds.quality(now_s, name, device.settings) for name in device.active}
     states = "".join(
         "X" if name not in quality else "T" if round(255 * quality[name]) else "L" for name in STATION_NAMES
@@ -42,28 +41,21 @@ def _report_tracking(device: DeviceState, argument: CommandArgument, now_s: floa
     device.reply(now_s, TrackingStatus(states, received, rejected, device.samples.rate_hz))
 
 
-def _read_errors(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
-    argument.require_empty()
-    device.reply(now_s, *device.errors)
+def _bare(act: Callable[[DeviceState, float], None]) -> LineCommand:
+    """A command that has no argument."""
+
+    def run(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
+        argument.require_empty()
+        act(device, now_s)
+
+    return run
 
 
-def _clear_errors(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
-    argument.require_empty()
-    device.errors.clear()
-
-
-def _send_log(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
-    argument.require_empty()
+def _send_log(device: DeviceState, now_s: float) -> None:
     device.reply(now_s, *(UnknownReply(f"31LF{entry}".encode("latin-1")) for entry in device.log))
 
 
-def _clear_log(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
-    argument.require_empty()
-    device.log.clear()
-
-
-def _report_information(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
-    argument.require_empty()
+def _report_information(device: DeviceState, now_s: float) -> None:
     device.reply(now_s, UnknownReply(f"51T{device.config.identification} {device.firmware}".encode("ascii")))
 
 
@@ -78,13 +70,13 @@ class Device(CommandDevice):
             "MB": lambda device, argument, now_s: boresight_station(
                 device, argument, now_s, not device.settings.boresight_as_fastrak
             ),
-            "MZ": _zero_clock,
-            "MP": _report_tracking,
-            "ME": _read_errors,
-            "MEC": _clear_errors,
-            "MLogSend": _send_log,
-            "MLogClear": _clear_log,
-            "MInfoSystem": _report_information,
+            "MZ": _bare(_zero_clock),
+            "MP": _bare(_report_tracking),
+            "ME": _bare(lambda device, now_s: device.reply(now_s, *device.errors)),
+            "MEC": _bare(lambda device, now_s: device.errors.clear()),
+            "MLogSend": _bare(_send_log),
+            "MLogClear": _bare(lambda device, now_s: device.log.clear()),
+            "MInfoSystem": _bare(_report_information),
         },
         setters=SETTER_COMMANDS,
         set_only=SET_ONLY_COMMANDS,

@@ -66,20 +66,16 @@ def _device_setter(field: str, low: int, high: int, kind: type = int) -> Setter:
     return setter
 
 
-def _constant_setter(**values: Any) -> Setter:
-    def setter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-        argument.require_empty()
-        return replace(settings, **values)
-
-    return setter
-
-
-def _emitter_setter(change: Callable[[DeviceSettings], dict[str, Any]]) -> Setter:
+def _bare_setter(change: Callable[[DeviceSettings], dict[str, Any]]) -> Setter:
     def setter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
         argument.require_empty()
         return replace(settings, **change(settings))
 
     return setter
+
+
+def _constant_setter(**values: Any) -> Setter:
+    return _bare_setter(lambda settings: values)
 
 
 SETTER_COMMANDS: dict[str, Setter] = {
@@ -112,8 +108,8 @@ SET_ONLY_COMMANDS: dict[str, Setter] = {
     "MGS": _device_setter("genlock_source", 1, 2),
     "MCf": _remove_emitter,
     "MCC": _constant_setter(draft_emitters=()),
-    "MCe": _emitter_setter(lambda settings: {"emitters": settings.draft_emitters}),
-    "MCx": _emitter_setter(lambda settings: {"draft_emitters": settings.emitters}),
+    "MCe": _bare_setter(lambda settings: {"emitters": settings.draft_emitters}),
+    "MCx": _bare_setter(lambda settings: {"draft_emitters": settings.emitters}),
     "MCi": no_change,
     "ML0": _constant_setter(lights=False),
     "ML1": _constant_setter(lights=True),

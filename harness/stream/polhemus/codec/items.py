@@ -60,6 +60,8 @@ class OutputItem:
     """Characters of one right-aligned value in ASCII; 0 where ASCII records hold the binary bytes."""
     decimals: int = 0
     """Digits after the decimal point in ASCII."""
+    exponent: bool = False
+    """Whether a value in ASCII has an exponent and a blank at its end."""
     blanks: int = 0
     """Blanks after the values in ASCII."""
     fixed: bytes = b""
@@ -101,11 +103,23 @@ ITEMS: dict[int, OutputItem] = {
     47: OutputItem("lens_2", "<f4", 1, 7, 2),
     48: OutputItem("lens_3", "<f4", 1, 7, 2),
     49: OutputItem("lens_4", "<f4", 1, 7, 2),
+    50: OutputItem("space", "u1", 1, fixed=b" "),
+    51: OutputItem("end_of_line", "u1", 2, fixed=b"\r\n"),
+    52: OutputItem("position", "<f4", 3, 13, 5, exponent=True),
+    54: OutputItem("yaw_pitch_roll_deg", "<f4", 3, 13, 5, exponent=True),
+    55: OutputItem("x_cosines", "<f4", 3, 13, 5, exponent=True),
+    56: OutputItem("y_cosines", "<f4", 3, 13, 5, exponent=True),
+    57: OutputItem("z_cosines", "<f4", 3, 13, 5, exponent=True),
+    61: OutputItem("quaternion", "<f4", 4, 13, 5, exponent=True),
+    66: OutputItem("stylus", "u1", 1, 1),
     75: OutputItem("radio_integrity", "u1", 1, 4),
     76: OutputItem("measurement_quality", "u1", 1, 4),
 }
 """Items by code. Some facts are inferred, not documented: 41 to 45 are integers; 16 has one digit per byte in ASCII; 75
 and 76, whose ranges are known, have the layout of 40."""
+EXTENDED_ITEMS = frozenset((50, 51, 52, 54, 55, 56, 57, 61, 66))
+"""Items of a FASTRAK that repeat others with an exponent and more digits in ASCII (its manual, revision G, page 59). In
+binary they are taken to be the same numbers."""
 UNDOCUMENTED_ITEMS = (68, 69, 70, 71)
 """The auxiliary inputs. Their sizes are on pages of the manual that are illegible."""
 
@@ -131,7 +145,7 @@ def resolve_items(items: tuple[int, ...], stylus_bytes: int = 1) -> tuple[Output
         if code not in ITEMS:
             raise UnknownName("output item", str(code), [str(known) for known in ITEMS])
         item = ITEMS[code] if code != 16 else replace(ITEMS[code], count=stylus_bytes)
-        if code in items[:position]:
+        if any(item.name == other.name for other in out):
             if not item.fixed:
                 raise BadInput(f"Output item {code} ({item.name}) is listed twice.", "List it once.")
             item = replace(item, name=f"{item.name}_{position}")

@@ -100,6 +100,11 @@ class WireFormat:
                 f"Give one of {known.decode()} for each, ascending, as the device reads them.",
             )
 
+    def describe(self) -> str:
+        """Return device, rate, list and format in words: `a FASTRAK at 30 Hz, items 2,11,1 in binary`."""
+        form = "UDP packets" if self.datagrams else "binary" if self.settings.binary else "ASCII"
+        return f"{with_article(self.family)} at {self.rate_hz:.4g} Hz, items {','.join(map(str, self.items))} in {form}"
+
 
 class ReadingsDecoder:
     """Decodes the records of a session: their numbers, continuous device time, and which of them are suspect."""

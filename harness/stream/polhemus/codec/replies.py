@@ -110,8 +110,9 @@ class StationStates(ParsedReply):
 class GeometryReply(ParsedReply):
     """The reply to a query of a station's geometry. Widths are those of docs/is900.md 14.
 
-    The letter is `A` alignment [cm], `G` boresight reference angles [deg], `H` hemisphere vector, `N` tip offset [cm]
-    or `V` envelope [m]. The decimals of `N` and `V` are a guess, so nothing should rely on them.
+    The letter is `A` alignment [cm], `G` boresight reference angles [deg], `H` hemisphere vector, `I` increment of a
+    FASTRAK, `N` tip offset [cm] or `V` envelope [m]. The decimals of `N` and `V` are a guess, so nothing should rely
+    on them.
     """
 
     station: str
@@ -133,7 +134,7 @@ def _parse_geometry(match: re.Match[str]) -> GeometryReply | None:
     return GeometryReply(match[1], match[2], tuple(map(float, fields)))
 
 
-_GEOMETRY_COLUMNS = {"A": (9, 7, 2), "G": (3, 7, 2), "H": (3, 7, 2), "N": (3, 8, 3), "V": (6, 8, 3)}
+_GEOMETRY_COLUMNS = {"A": (9, 7, 2), "G": (3, 7, 2), "H": (3, 7, 2), "I": (1, 7, 2), "N": (3, 8, 3), "V": (6, 8, 3)}
 """Number of values, their width and their decimals, by letter."""
 _FLOAT = re.compile(r" *-?\d*\.?\d+ *")
 
@@ -320,7 +321,7 @@ _PATTERNS: dict[str, Callable[[re.Match[str]], ParsedReply | None]] = {
     r"2([1-9A-C])l([01]{4}|[01]{32})": lambda m: StationStates(
         None if len(m[2]) == 32 else m[1], tuple(digit == "1" for digit in m[2])
     ),
-    r"(?s).(.)([AGHNV])(.*)": _parse_geometry,
+    r"(?s).(.)([AGHINV])(.*)": _parse_geometry,
     r"(?=.{46}$)31P((?:[TLX][0-9A-Fa-f ]{2}){12})( *\d+(?:\.\d*)? *) (.)": _parse_tracking,
     r"31S(.)([0-9A-Fa-f])([0-9A-Fa-f])": _parse_system,
     r"3([1-9A-C])s.([0-2])([0-9A-Fa-f])": lambda m: StationRecord(m[1], int(m[2]), int(m[3], 16) >> 1 & 3),

@@ -10,10 +10,11 @@ from harness.core.network import FASTRAK_PREFIX
 from harness.errors import BadInput
 from harness.stream.line_events import LineObserver
 from harness.stream.polhemus.codec.commands import RESUME, STATUS, STOP
-from harness.stream.polhemus.codec.items import BAUD_RATES, DEVICE_NAMES, with_article
+from harness.stream.polhemus.codec.items import BAUD_RATES, DEVICE_NAMES, DeviceFamily, with_article
 from harness.stream.polhemus.codec.replies import DeviceError, ParsedReply, StatusRecord, parse_reply
 from harness.stream.polhemus.driver.config import DriverTiming, LineConfig
-from harness.stream.polhemus.driver.transport import LineLost, Transport, family_of, open_transport
+from harness.stream.polhemus.driver.open_transport import open_transport
+from harness.stream.polhemus.driver.transport import LineLost, Transport
 from harness.stream.tracker import DriverClosed
 
 
@@ -158,24 +159,27 @@ class DetectedDevice:
     status: StatusRecord
 
 
-def candidate_baud_rates(port: str, config: LineConfig) -> Sequence[int | None]:
-    """Return the baud rates to try on this port; (None,) over TCP."""
-    if "://" in port:
-        return (None,)
-    return BAUD_RATES if config.baud is None else (config.baud,)
+def describe_device(status: StatusRecord, family: DeviceFamily) -> str:
+    """Return name and firmware of a device. A FASTRAK has a text of its owner where an IS-900 has its name."""
+    name = status.identification.strip() if family == "is900" else ""
+    return f"{name or DEVICE_NAMES[family]}, firmware {status.firmware}"
 
 
 def detect_device(
-    port: str, bauds: Sequence[int | None], connect: Callable[[int | None], DeviceConnection], answer_s: float
+    port: str, config: LineConfig, connect: Callable[[int | None], DeviceConnection], answer_s: float
 ) -> DetectedDevice:
-    """Open the port at one baud rate after another until a device of its family answers; BadInput when none does."""
+    """Open the port at one baud rate after another until a device of the family answers; BadInput when none does.
+
+    Without a rate in `config` each is tried; an address on a network has none.
+    """
+    bauds = (None,) if "://" in port else BAUD_RATES if config.baud is None else (config.baud,)
     total_bytes = 0
     for baud in bauds:
         line = connect(baud)
         try:
             status = query_status(line, answer_s)
             if status is not None:
-                _check_kind(port, status)
+                _check_kind(port, status, config.family)
                 return DetectedDevice(line, baud, status)
             total_bytes += line.received_bytes
         except LineLost as lost:
@@ -187,7 +191,7 @@ def detect_device(
             line.transport.close()
             raise
         line.transport.close()
-    raise _no_answer_error(port, bauds, total_bytes)
+    raise _no_answer_error(port, bauds, total_bytes, config.family)
 
 
 def query_status(line: DeviceConnection, answer_s: float) -> StatusRecord | None:
@@ -201,9 +205,9 @@ def query_status(line: DeviceConnection, answer_s: float) -> StatusRecord | None
     return status
 
 
-def _check_kind(port: str, status: StatusRecord) -> None:
-    """Raise BadInput for a device of another family than the port's name says. Every IS-900 has its name in `S`."""
-    expected, is_is900 = family_of(port), "IS900" in re.sub("[- ]", "", status.identification.upper())
+def _check_kind(port: str, status: StatusRecord, expected: DeviceFamily) -> None:
+    """Raise BadInput for a device of another family than is expected. Every IS-900 has its name in `S`."""
+    is_is900 = "IS900" in re.sub("[- ]", "", status.identification.upper())
     if is_is900 == (expected == "is900"):
         return
     advice = f"Name the port of an IS-900; a FASTRAK is at {FASTRAK_PREFIX}{port}."
@@ -216,8 +220,8 @@ def _check_kind(port: str, status: StatusRecord) -> None:
     )
 
 
-def _no_answer_error(port: str, bauds: Sequence[int | None], received_bytes: int) -> NoAnswer:
-    device = with_article(family_of(port))
+def _no_answer_error(port: str, bauds: Sequence[int | None], received_bytes: int, family: DeviceFamily) -> NoAnswer:
+    device = with_article(family)
     rates = " at " + ", ".join(map(str, bauds)) + " baud" if bauds[0] else ""
     advice = "The baud rate may be wrong: omit it, and each is tried. " if bauds[0] and len(bauds) == 1 else ""
     if received_bytes == 0:

@@ -16,7 +16,7 @@ from harness.stream.polhemus.driver.connection import (
     DetectedDevice,
     DeviceConnection,
     NoAnswer,
-    candidate_baud_rates,
+    describe_device,
     detect_device,
     query_status,
 )
@@ -45,7 +45,7 @@ class LineTracker(Tracker):
         port = self.port
         self._watchdog = Watchdog(self._timing)
         self._line_lock, self._closed = threading.RLock(), False
-        detected = detect_device(port, candidate_baud_rates(port, self.config), self._connect, self._timing.answer_s)
+        detected = detect_device(port, self.config, self._connect, self._timing.answer_s)
         self._line, self._baud, self._status = detected.line, detected.baud, detected.status
         self._stations = StationSelection("", (), "")
         try:
@@ -90,14 +90,9 @@ class LineTracker(Tracker):
         return self._baud
 
     @property
-    def firmware(self) -> str:
-        """Firmware version that the device reports."""
-        return self._status.firmware
-
-    @property
     def identification(self) -> str:
-        """Name that the device reports."""
-        return self._status.identification
+        """Name and firmware of the device."""
+        return describe_device(self._status, self.config.family)
 
     @property
     def station_list(self) -> str:
@@ -224,7 +219,8 @@ class LineTracker(Tracker):
 
     def _reopen(self) -> DetectedDevice:
         self._line.transport.close()
-        detected = detect_device(self.port, (self._baud,), self._connect, self._timing.answer_s)
+        config = replace(self.config, baud=self._baud)
+        detected = detect_device(self.port, config, self._connect, self._timing.answer_s)
         self._line, self._status = detected.line, detected.status
         return detected
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.core.arrays import Floats, Ints
 from harness.errors import BadInput
-from harness.stream.polhemus.codec.items import STATION_CHARACTERS
+from harness.stream.polhemus.codec.items import EXTENDED_ITEMS, ITEMS, STATION_CHARACTERS
 from harness.stream.polhemus.emulator.faults import Fault, check_firmware
 
 PERIOD_S = 8.0
@@ -91,14 +91,17 @@ class EmulatorConfig:
     """Faults that are injected."""
     seed: int = 1
     """Seed of the faults' random draws."""
-    known_items: ClassVar[frozenset[int]] = frozenset()
-    """Items that the device knows; empty for all of `ITEMS` that its firmware has."""
+    known_items: ClassVar[frozenset[int]] = frozenset(ITEMS) - EXTENDED_ITEMS
+    """Items that the device knows, where its firmware has them."""
     usual_items: ClassVar[tuple[int, ...]] = ()
     """Output list that this project's driver requests; empty for that of a scenario."""
     known_stations: ClassVar[str] = STATION_CHARACTERS.decode()
     """Characters of the stations that the device can have."""
     fastrak: ClassVar[bool] = False
-    """Whether `B` turns all of an orientation, and lengths in commands have the unit of records, as on a FASTRAK."""
+    """Whether `B` turns all of an orientation, lengths in commands have the unit of records, and positions lie in a
+    hemisphere, as on a FASTRAK."""
+    hemisphere: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    """Hemisphere vector of each station after power-on (`H`)."""
 
     def __post_init__(self) -> None:
         check_firmware(self.firmware)

@@ -150,6 +150,5 @@ class CommandDevice(DeviceState):
     def _check_items(self, argument: CommandArgument) -> None:
         """Raise CommandError for items that this device or firmware does not have."""
         for index, code in enumerate(argument.numbers()):
-            known = self.config.known_items
-            if (known and code not in known) or missing_items([int(code)], float(self.firmware[:4])):
+            if code not in self.config.known_items or missing_items([int(code)], float(self.firmware[:4])):
                 raise CommandError(OUT_OF_RANGE, index + 2)

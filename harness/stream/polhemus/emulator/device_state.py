@@ -174,6 +174,10 @@ class DeviceState:
         self._silent_until_s = now_s + self.config.restart_s
         self.rounds.player.begin(self._silent_until_s)
 
+    def _is_due(self, number: int, row: int) -> bool:
+        """Whether a station that streams sends its reading of a round."""
+        return True
+
     def _play(self, now_s: float) -> None:
         """Send the readings until now."""
         player, plugged = self.rounds.player, self.rounds.station_characters
@@ -184,14 +188,14 @@ class DeviceState:
                 return
             self._next = (number, row + 1) if row + 1 < len(plugged) else (number + 1, 0)
             name = plugged[row]
-            if self.settings.station(name).active and not self.suspended:
+            if self.settings.station(name).active and not self.suspended and self._is_due(number, row):
                 data = self.rounds.records(number, self.settings)[name]
                 self._out.append(Message(taken_s + self.samples.ready_s, data, name))
 
 
 def _factory_settings(samples: DeviceSamples, config: EmulatorConfig, plugged: str) -> DeviceSettings:
     """Return the settings after power-on: plugged stations are on, and a filter brings its settings."""
-    stations = [StationSettings(active=name in plugged) for name in STATION_NAMES]
+    stations = [StationSettings(active=name in plugged, hemisphere=config.hemisphere) for name in STATION_NAMES]
     settings = DeviceSettings(
         tuple(stations),
         boresight_as_fastrak=config.fastrak,

@@ -1,9 +1,12 @@
 """Device, serial line and faults together, without input or output: bytes in, bytes with their times out."""
 
 from collections import deque
+from typing import ClassVar
 
 from harness.errors import UnknownName
 from harness.stream.polhemus.codec.items import BITS_PER_BYTE
+from harness.stream.polhemus.codec.samples import DeviceSamples
+from harness.stream.polhemus.emulator.config import EmulatorConfig
 from harness.stream.polhemus.emulator.device import CommandDevice
 from harness.stream.polhemus.emulator.device_state import Message, SentMessage
 from harness.stream.polhemus.emulator.faults import FaultEpisode, FaultInjector
@@ -109,10 +112,12 @@ class SerialLine:
 class LineEmulator:
     """A device and its line as a host sees them. Calls must have increasing times."""
 
-    def __init__(self, device: CommandDevice, now_s: float = 0.0) -> None:
-        """Connect a device. Raises UnknownName when a fault names a station that is not in its samples."""
-        self.config, self.device = device.config, device
-        samples = device.samples
+    device_type: ClassVar[type[CommandDevice]]
+
+    def __init__(self, samples: DeviceSamples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
+        """Switch the device on. Raises UnknownName when a fault names a station that is not in the samples."""
+        self.device = self.device_type(samples, config, now_s)
+        self.config = self.device.config
         self.line = SerialLine(self.config.baud, self.config.queue_records, self.config.paced)
         self.episodes: list[FaultEpisode] = []
         """All fault episodes that have begun."""

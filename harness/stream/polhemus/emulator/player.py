@@ -9,7 +9,12 @@ from harness.core.arrays import Floats
 from harness.stream.polhemus.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
 from harness.stream.polhemus.codec.samples import MAX_RANGES, DeviceSamples
 from harness.stream.polhemus.emulator.config import CONTROL_PATTERNS, EmulatorConfig
-from harness.stream.polhemus.emulator.settings import DeviceSettings, StationSettings, apply_station_settings
+from harness.stream.polhemus.emulator.settings import (
+    DeviceSettings,
+    StationSettings,
+    apply_station_settings,
+    into_hemisphere,
+)
 
 _SAME_TIME_S = 1e-9
 """Times closer than this count as equal [s]."""
@@ -82,6 +87,7 @@ class RoundEncoder:
 
     def __init__(self, player: SamplePlayer, config: EmulatorConfig) -> None:
         self.player, self._pattern, self._stylus_bytes = player, CONTROL_PATTERNS[config.controls], config.stylus_bytes
+        self._has_hemispheres = config.fastrak
         self.station_characters = config.station_characters(len(player.samples.stations))
         """Characters of the stations that are plugged in."""
         self._lost: frozenset[str] = frozenset()
@@ -140,6 +146,8 @@ class RoundEncoder:
         # Each station is a second ahead of the one before, so that a client that mixes them up shows it.
         buttons, joystick = self._pattern(number / samples.rate_hz + np.arange(len(samples.stations), dtype=float))
         for row, (name, station) in enumerate(zip(self.station_characters, self._stations(settings), strict=True)):
+            if self._has_hemispheres:
+                position_m[row] = into_hemisphere(position_m[row], station)
             if not station.plain:
                 position_m[row], orientation[row] = apply_station_settings(position_m[row], orientation[row], station)
             if self._is_lost(name, settings):

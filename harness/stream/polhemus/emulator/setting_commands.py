@@ -127,7 +127,8 @@ def station_query(reply: Callable[[str, StationSettings, float], replies.ParsedR
     return query
 
 
-def _geometry_query(letter: str, values: Callable[[StationSettings, float], Iterable[float]]) -> Query:
+def geometry_query(letter: str, values: Callable[[StationSettings, float], Iterable[float]]) -> Query:
+    """Query of numbers of a station: `values` takes its settings and the unit of lengths in commands [m]."""
     return station_query(
         lambda name, station, unit_m: replies.GeometryReply(name, letter, tuple(values(station, unit_m)))
     )
@@ -142,10 +143,10 @@ def station_states(settings: DeviceSettings, argument: CommandArgument) -> Itera
 STATION_QUERIES: dict[str, Query] = {
     "O": station_query(lambda name, station, unit_m: replies.OutputList(name, station.items)),
     "l": station_states,
-    "A": _geometry_query("A", lambda station, unit_m: (value / unit_m for value in alignment_m(station))),
-    "G": _geometry_query("G", lambda station, unit_m: station.reference_deg),
-    "H": _geometry_query("H", lambda station, unit_m: station.hemisphere),
-    "N": _geometry_query("N", lambda station, unit_m: (value / unit_m for value in station.tip_m)),
-    "V": _geometry_query("V", lambda station, unit_m: station.envelope_m),
+    "A": geometry_query("A", lambda station, unit_m: (value / unit_m for value in alignment_m(station))),
+    "G": geometry_query("G", lambda station, unit_m: station.reference_deg),
+    "H": geometry_query("H", lambda station, unit_m: station.hemisphere),
+    "N": geometry_query("N", lambda station, unit_m: (value / unit_m for value in station.tip_m)),
+    "V": geometry_query("V", lambda station, unit_m: station.envelope_m),
 }
 """The reply to each query."""

@@ -48,7 +48,10 @@ class StationSettings:
     reference_deg: Vector = ZERO_VECTOR
     """Yaw, pitch and roll that the next boresight gives the present orientation (`G`) [deg]."""
     hemisphere: Vector = (1.0, 0.0, 0.0)
-    """Hemisphere vector of a Fastrak (`H`); stored without effect."""
+    """Direction of the half space in which a FASTRAK takes the station to be (`H`); zero where it follows the station.
+    An IS-900 stores it without effect."""
+    increment_m: float = 0.0
+    """Movement along an axis after which a FASTRAK that streams sends the next record (`I`) [m]; 0 sends all."""
     tip_m: Vector = ZERO_VECTOR
     """Tip offset in the station's own axes [m]."""
     envelope_m: tuple[float, ...] = (10.0, 10.0, 10.0, -10.0, -10.0, -10.0)
@@ -134,6 +137,15 @@ def apply_station_settings(position_m: Floats, quaternion: Floats, station: Stat
     return position_m, rotations.multiply(
         rotations.multiply(np.array(station.heading_boresight), quaternion), np.array(station.full_boresight)
     )
+
+
+def into_hemisphere(position_m: Floats, station: StationSettings) -> Floats:
+    """Return the position (3,) that a FASTRAK reports [m]: its field is the same at the opposite place.
+
+    The manual says that the signs of x, y and z flip outside the hemisphere (revision G, pages 50 and 51). Orientation
+    follows from the field, so it stays.
+    """
+    return -position_m if position_m @ np.array(station.hemisphere) < 0.0 else position_m
 
 
 def align(station: StationSettings, origin_m: Floats, on_x_m: Floats, on_y_m: Floats) -> StationSettings | None:

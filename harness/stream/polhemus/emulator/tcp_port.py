@@ -9,6 +9,7 @@ from typing import Protocol
 
 from harness.core.network import check_loopback, resolve_host
 from harness.errors import BadInput
+from harness.stream.client_socket import MAX_CLIENTS, ClientSocket
 from harness.stream.polhemus.codec.commands import CommandReader
 
 
@@ -59,67 +60,29 @@ class Port(Protocol):
 MAX_UNREAD_BYTES = 1 << 16
 """Bytes that wait here for a client, beyond those in the operating system's buffers: six seconds of a full line of
 115200 baud [bytes]."""
-_READ_BYTES = 4096
 _SEND_BUFFER_BYTES = 1 << 16
 
 
-class TcpClient:
-    """One connection. It never blocks, and a command that the client has not finished disturbs no other client."""
+class TcpClient(ClientSocket):
+    """One connection. A command that the client has not finished disturbs no other client."""
 
     def __init__(self, connection: socket.socket, name: str) -> None:
-        self.name = name
-        self.open = True
-        """False once the client has closed the connection or lost it."""
-        self._connection, self._unsent = connection, b""
-        self._commands = CommandReader()
-        connection.setblocking(False)
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        super().__init__(connection, name)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
-
-    def fileno(self) -> int:
-        """Return the descriptor of the connection."""
-        return self._connection.fileno()
-
-    @property
-    def unread_bytes(self) -> int:
-        """Number of bytes that the client has left no room for."""
-        return len(self._unsent)
+        self._commands = CommandReader()
 
     def read(self) -> bytes:
         """Return the commands that have become complete."""
-        try:
-            data = self._connection.recv(_READ_BYTES)
-        except BlockingIOError:
-            return b""
-        except OSError:
-            data = b""
-        self.open &= bool(data)
-        return b"".join(command.encode() for command in self._commands.feed(data))
+        return b"".join(command.encode() for command in self._commands.feed(self.receive()))
 
     def write(self, data: bytes) -> None:
         """Send bytes, or keep them until the client reads."""
-        self._unsent += data
+        self.unsent += data
         self.flush()
-
-    def flush(self) -> None:
-        """Send as many of the waiting bytes as the client takes."""
-        try:
-            while self._unsent:
-                self._unsent = self._unsent[self._connection.send(self._unsent) :]
-        except BlockingIOError:
-            pass
-        except OSError:
-            self.open = False
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._connection.close()
 
 
 LogCallback = Callable[[str], None]
 """Receives one line of text for the user."""
-MAX_CLIENTS = 32
-"""Further clients are turned away."""
 IDLE_S = 5.0
 """A client keeps the device until it has sent and received nothing for this long [s] [choice]."""
 
@@ -162,7 +125,7 @@ class TcpPort:
         return [end.fileno() for end in (*ends, *self._clients)]
 
     def writable(self) -> list[int]:
-        return [client.fileno() for client in self._clients if client.unread_bytes]
+        return [client.fileno() for client in self._clients if client.unsent]
 
     def read(self) -> bytes:
         for client in self._clients:
@@ -186,7 +149,7 @@ class TcpPort:
 
     def unplug(self) -> None:
         for client in self._clients:
-            client.open = False
+            client.gone = "gone"
         self._drop_clients()
         if self._server is not None:
             self._server.close()
@@ -210,12 +173,12 @@ class TcpPort:
     def _read_from(self, client: TcpClient) -> bytes:
         """Return the commands of a client if the device is free for it; turn it away if not."""
         data, now_s = client.read(), time.monotonic()
-        if not client.open and self._user is client:
+        if client.gone and self._user is client:
             self._user = None
         if not data:
             return b""
         if self._user not in (None, client) and now_s < self._used_s + self._idle_s:
-            client.open = False
+            client.gone = "gone"
             self._log(f"turned away {client.name}: another client has the device")
             return b""
         self._user, self._used_s = client, now_s
@@ -237,10 +200,10 @@ class TcpPort:
     def _drop_clients(self) -> None:
         """Close the connections that have ended, and those of clients that do not read."""
         for client in self._clients.copy():
-            if client.open and client.unread_bytes <= MAX_UNREAD_BYTES:
+            if not client.gone and len(client.unsent) <= MAX_UNREAD_BYTES:
                 continue
             self._clients.remove(client)
             self._user = None if self._user is client else self._user
             client.close()
-            reason = f"dropped: it left {client.unread_bytes} bytes unread" if client.open else "gone"
+            reason = "gone" if client.gone else f"dropped: it left {len(client.unsent)} bytes unread"
             self._log(f"client {client.name} {reason}")

@@ -17,15 +17,15 @@ import pytest
 from harness.cli import main
 from harness.errors import BadInput
 from harness.experiment import prepare_playback
+from harness.stream.emulators import serve_emulator
 from harness.stream.is900.driver.broadcast import Is900Broadcast
 from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import open_tracker
-from harness.stream.is900.emulator.emulator import serve_emulator
 from harness.stream.line_events import LineEvent
 from harness.stream.polhemus.codec.datagram import Datagram, parse_datagram
 from harness.stream.polhemus.codec.samples import DeviceSamples
 from harness.stream.polhemus.driver.config import DriverTiming
-from harness.stream.polhemus.driver.transport import open_transport
+from harness.stream.polhemus.driver.open_transport import open_transport
 from harness.stream.polhemus.emulator.config import EmulatorConfig
 from harness.stream.polhemus.emulator.server import EmulatorServer
 from harness.stream.polhemus.emulator.udp_broadcast import parse_udp_address

@@ -53,7 +53,7 @@ def test_the_commands_are_sent_in_the_right_sequence() -> None:
 def test_device_properties_are_reported() -> None:
     bench = bench_of(stations=3, rate_hz=60.0, status_bytes=54, firmware="4.1402", identification="IS900VWT")
     stream = bench.driver(DriverConfig(stations=("head", "left", "right")))
-    assert (stream.firmware, stream.identification, stream.baud) == ("4.1402", "IS900VWT", 115200)
+    assert (stream.identification, stream.baud) == ("IS900VWT, firmware 4.1402", 115200)
     assert stream.stations == ("head", "left", "right")
     assert (stream.wire.characters, stream.wire.rate_hz, stream.wire.items) == (b"123", 60.0, STANDARD_LIST)
 

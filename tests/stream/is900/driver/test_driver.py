@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadInput
+from harness.stream.emulators import serve_emulator
 from harness.stream.frame import TrackerFrame
 from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
-from harness.stream.is900.emulator.emulator import serve_emulator
 from harness.stream.line_events import LineEvent
 from harness.stream.polhemus.driver.config import DriverTiming
 from harness.stream.polhemus.emulator.config import EmulatorConfig

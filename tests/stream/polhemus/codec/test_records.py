@@ -183,12 +183,13 @@ INCHES, CENTIMETRES = 0.0254, 0.01
 POSE = np.array([[1.0, -0.5, 1.5]]), from_yaw_pitch_roll_deg(np.array([[90.0, -10.0, 5.5]]))
 EXAMPLE_D = b"01   39.37 -19.69  59.06  90.00 -10.00   5.50\r\n"
 EXAMPLE_E = b"03  214  39.37 -19.69  59.06  90.00 -10.00   5.50         12345   5  127 255\r\n"
-CONTENT_ITEMS = tuple(code for code in items.ITEMS if code not in (0, 1))
+CONTENT_ITEMS = tuple(code for code in items.ITEMS if code not in (0, 1, 50, 51))
 """Every item that says something."""
 LISTS = (
     [(code, 1) for code in CONTENT_ITEMS]
     + [(code,) for code in CONTENT_ITEMS]
-    + [(), (1,), (0, 2, 0, 4, 1), (5, 6, 1), (5, 7), (*CONTENT_ITEMS, 1)]
+    + [(), (1,), (0, 2, 0, 4, 1), (5, 6, 1), (5, 7), (*(c for c in CONTENT_ITEMS if c not in items.EXTENDED_ITEMS), 1)]
+    + [(52, 50, 61, 0, 51, 1), (52, 54, 11), (55, 56, 51), (2, 61, 1)]
 )
 
 
@@ -317,13 +318,18 @@ def _tolerances(codes: tuple[int, ...], settings: RecordFormat) -> tuple[float, 
     """How far place [m] and turn [rad] may be off by the coarsest rounding of their item."""
     binary = settings.binary
     position_m_by_item = {2: 1e-6 if binary else 0.0051 * settings.metres_per_unit, 18: 3.0 / 8192}
+    position_m_by_item[52] = 1e-6 if binary else 0.00051 * settings.metres_per_unit
     quaternions = {11: 1e-6 if binary else 3e-4, 20: 1e-3, 4: 1e-5 if binary else 3e-4, 19: 1e-3}
+    quaternions |= {61: 2e-5, 54: 3e-5}
+    if sum(code in codes for code in (55, 56, 57)) >= 2:
+        quaternions[55] = 3e-5
     if sum(code in codes for code in (5, 6, 7)) >= 2:
         quaternions[5] = quaternions[6] = quaternions[7] = 1e-5 if binary else 3e-4
     else:
         quaternions[5] = quaternions[6] = quaternions[7] = np.inf
     position_tolerance_m = next((position_m_by_item[code] for code in codes if code in position_m_by_item), np.inf)
-    return position_tolerance_m, next((quaternions[code] for code in (11, 20, 4, 19, 5, 6, 7) if code in codes), np.inf)
+    by_rank = (quaternions.get(code, np.inf) for code in (11, 61, 20, 4, 54, 19, 5, 6, 7, 55) if code in codes)
+    return position_tolerance_m, next(by_rank, np.inf)
 
 
 def test_both_sizes_of_the_stylus_item() -> None:

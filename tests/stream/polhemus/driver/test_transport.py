@@ -3,6 +3,7 @@
 import contextlib
 import os
 import socket
+import termios
 import threading
 import time
 import tty
@@ -13,7 +14,9 @@ import pytest
 import serial
 
 from harness.errors import BadInput
-from harness.stream.polhemus.driver.transport import LineLost, PolledSerialTransport, Transport, open_transport
+from harness.stream.polhemus.driver.open_transport import open_transport
+from harness.stream.polhemus.driver.serial_transport import PolledSerialTransport
+from harness.stream.polhemus.driver.transport import LineLost, Transport, describe_io_error
 
 TIMEOUT_S = 120.0
 
@@ -194,6 +197,34 @@ def test_socket_addresses_are_tcp_without_delay() -> None:
     end.close()
 
 
+@pytest.mark.parametrize(
+    ("error", "why"),
+    [
+        (
+            serial.SerialException("device reports readiness to read but returned no data (multiple access on port?)"),
+            "the line is gone (unplugged, or closed by its other end)",
+        ),
+        (serial.SerialTimeoutException("Write timeout"), "the line takes no byte for 2 s"),
+        (OSError(5, "Input/output error"), "the line is gone (Input/output error)"),
+        (termios.error(5, "Input/output error"), "the line is gone (Input/output error)"),
+        (ValueError("closed file"), "the line is gone (closed file)"),
+        (OSError(), "the line is gone ()"),
+    ],
+)
+def test_a_lost_line_is_told_in_one_clear_sentence(error: Exception, why: str) -> None:
+    assert describe_io_error(error) == why
+
+
+def test_a_pty_that_closes_is_a_lost_line(tmp_path: Path) -> None:
+    end = PtyEnd(tmp_path / "port")
+    transport = open_transport(end.name)
+    end.close()
+    with pytest.raises(LineLost) as lost:
+        transport.read(TIMEOUT_S)
+    assert lost.value.why == "the line is gone (unplugged, or closed by its other end)"
+    transport.close()
+
+
 def test_a_link_to_another_port_is_a_lost_line(tmp_path: Path) -> None:
     first_end = PtyEnd(tmp_path / "port")
     transport = open_transport(first_end.name)
@@ -221,6 +252,8 @@ def free_port() -> int:
         (lambda folder: "tcp://127.0.0.1:seven", "Write tcp://HOST:PORT"),
         (lambda folder: "tcp://127.0.0.1:99999", "Write tcp://HOST:PORT"),
         (lambda folder: "spy:///dev/ttyS0", "this kind of address is not known"),
+        (lambda folder: "fastrak:", "Write fastrak:/dev/ttyUSB0, fastrak:COM3 or fastrak:tcp://HOST:PORT."),
+        (lambda folder: "", "Write /dev/ttyUSB0, COM3 or tcp://HOST:PORT."),
     ],
 )
 def test_a_port_that_cannot_be_opened_is_named_with_a_remedy(

@@ -16,13 +16,15 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadInput
-from harness.stream.is900.emulator.emulator import Emulator, serve_emulator
+from harness.stream.client_socket import MAX_CLIENTS
+from harness.stream.emulators import serve_emulator
+from harness.stream.is900.emulator.emulator import Emulator
 from harness.stream.polhemus.emulator.config import EmulatorConfig
 from harness.stream.polhemus.emulator.device_state import SentMessage
 from harness.stream.polhemus.emulator.faults import Fault
 from harness.stream.polhemus.emulator.pty_port import PtyPort
 from harness.stream.polhemus.emulator.server import EmulatorServer, open_port
-from harness.stream.polhemus.emulator.tcp_port import MAX_CLIENTS, TcpPort
+from harness.stream.polhemus.emulator.tcp_port import TcpPort
 from tests.stream.is900.emulator.played import make_samples
 
 TIMEOUT_S = 120.0
@@ -296,7 +298,7 @@ def test_waiting_uses_no_processor_time(link: Path) -> None:
     """Alone in a process: 2 s of silence."""
     code = f"""
 import time
-from harness.stream.is900.emulator.emulator import serve_emulator
+from harness.stream.emulators import serve_emulator
 from tests.stream.is900.emulator.played import make_samples
 with serve_emulator(make_samples(), pty={str(link)!r}):
     before = time.process_time()

@@ -8,12 +8,13 @@ import pytest
 
 from harness.errors import BadInput
 from harness.experiment import Playback, prepare_playback
+from harness.stream.emulators import serve_emulator
 from harness.stream.frame import TrackerFrame
-from harness.stream.is900.emulator.emulator import serve_emulator
 from harness.stream.polhemus.codec import commands
 from harness.stream.polhemus.codec.items import record_type
 from harness.stream.polhemus.codec.reader import FrameReader, WireFormat
-from harness.stream.polhemus.driver.transport import Transport, open_transport
+from harness.stream.polhemus.driver.open_transport import open_transport
+from harness.stream.polhemus.driver.transport import Transport
 from harness.stream.polhemus.emulator.config import EmulatorConfig
 from harness.stream.polhemus.emulator.device_state import Message, SentMessage
 from harness.stream.polhemus.emulator.server import ServerCounts
