@@ -27,7 +27,7 @@ FILES = {
 """File -> what the message calls it; "" where verbs call it differently."""
 LIVE = "live --port /dev/no_such_port --method mean_pose --scenario"
 READERS = {
-    "inspect FILE": ("motion.bvh", "constellation.mcf"),
+    "inspect FILE": ("motion.bvh", "walking.rec", "constellation.mcf"),
     "view FILE --out page.html": ("motion.bvh", "walking.rec"),
     "run FILE": ("small.toml",),
     "sweep FILE": ("sweep.toml",),
