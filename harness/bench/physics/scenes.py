@@ -6,15 +6,18 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from harness.body import DEFAULT_MOUNTS, build_body, tpose
+from harness.bench import common
+from harness.body import DEFAULT_MOUNTS, build_body, retarget_to_own_body, tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
+from harness.mocap import synthetic
 from harness.simulate import (
     WORLD_FROM_TRACKER,
     Noise,
+    SimulatedReadings,
     TrackerConfig,
     Trajectory,
     noise_preset,
@@ -234,3 +237,19 @@ def scaled_position_m(place_m: Floats, scale: float, physics: Physics) -> Floats
 
     found: Floats = least_squares(residuals, place_m).x
     return found
+
+
+def simulate_performer(
+    behaviour: str, seed: int, seconds: float, noise: Noise
+) -> tuple[SimulatedReadings, SimulatedReadings]:
+    """Readings of the six stations on built-in motion, and the true ones, at the tracker's default rate."""
+    performers = synthetic.REFERENCE_PERFORMERS
+    clip = synthetic.generate(behaviour, performers[seed % len(performers)], 1, seed=seed, duration_s=seconds)
+    body, take = retarget_to_own_body(clip)
+    trajectory, tracker = Trajectory(body, take), TrackerConfig()
+    time_s = sampling_times_s(trajectory.duration_s, tracker, len(common.MOUNTS))
+    found, true = (
+        simulate_readings(trajectory, common.MOUNTS, tracker, model, time_s, seed=seed, take=take.name)
+        for model in (noise, noise_preset("clean"))
+    )
+    return found, true
