@@ -16,6 +16,7 @@ from harness.core.seeds import generator
 from harness.mocap import synthetic
 from harness.simulate import (
     WORLD_FROM_TRACKER,
+    FilterReadings,
     Noise,
     SimulatedReadings,
     TrackerConfig,
@@ -51,8 +52,9 @@ BYSTANDER = Box(centre_m=(0.0, 0.7, 0.875), size_m=(0.5, 0.3, 1.75))
 BOARD = Box(centre_m=(0.2, 0.1, 1.9), size_m=(0.8, 0.8, 0.1))
 """A board that hangs above the free motion and shades a part of it, such as a lamp."""
 _TRACKER = TrackerConfig(rate_hz=RATE_HZ)
-_ORIGIN_M = np.array(_TRACKER.origin_m)
-MIDDLE_M = (0.0, 0.0, float(_ORIGIN_M[2]) - HEIGHT_M)
+ORIGIN_M = np.array(_TRACKER.origin_m)
+"""Origin of the tracker's frame in the world [m]."""
+MIDDLE_M = (0.0, 0.0, float(ORIGIN_M[2]) - HEIGHT_M)
 """The middle of the free motion in the tracker's frame [m]."""
 STATION = "station"
 
@@ -134,16 +136,29 @@ def track_free_station(
     covered_s: tuple[float, float] | None = None,
 ) -> StationErrors:
     """Errors of a free station. `make_source` makes equal sources; all emitters are covered in `covered_s` [s]."""
-    placed = PlacedRoom(physics.room, np.zeros(2), WORLD_FROM_TRACKER, _ORIGIN_M)
+    time_s, readings = measure_free_station(make_source(), seconds, physics, seed, covered_s=covered_s)
+    true = make_source().sample_motion(time_s)
+    turns = readings.tracker_from_station, true.tracker_from_station
+    return _errors(time_s, (readings.position_m, true.position_m), turns, readings.quality)
+
+
+def measure_free_station(
+    source: FreeMotionSource,
+    seconds: float,
+    physics: Physics,
+    seed: int,
+    *,
+    covered_s: tuple[float, float] | None = None,
+) -> tuple[Floats, FilterReadings]:
+    """Times (E,) of the records of a free station [s], and what they show; see `track_free_station`."""
+    placed = PlacedRoom(physics.room, np.zeros(2), WORLD_FROM_TRACKER, ORIGIN_M)
     shade = physics.room.shadow and bool(physics.room.furniture)
     constellation, sight = load_constellation(physics.constellation), LineOfSight(None, placed) if shade else None
-    tracker = PhysicalTracker(make_source(), physics, constellation, placed, sight, seed=seed, take=STATION)
+    tracker = PhysicalTracker(source, physics, constellation, placed, sight, seed=seed, take=STATION)
     if covered_s is not None:
         tracker.ranging = _CoveredEmitters(tracker.ranging, covered_s, tracker.schedule.slot_s)
     time_s = np.arange(int(seconds * RATE_HZ) + 1) / RATE_HZ
-    readings, true = tracker.measure_take(time_s[:, None]), make_source().sample_motion(time_s)
-    turns = readings.tracker_from_station, true.tracker_from_station
-    return _errors(time_s, (readings.position_m, true.position_m), turns, readings.quality)
+    return time_s, tracker.measure_take(time_s[:, None])
 
 
 def join_errors(parts: Sequence[StationErrors]) -> StationErrors:

@@ -6,6 +6,7 @@ Every row is computed with the default settings. A row that misses its figure sa
 from collections.abc import Callable, Iterable, Sequence
 
 from harness.bench.physics.first_fix import first_fix_rows
+from harness.bench.physics.hall import hall_rows
 from harness.bench.physics.single_station import station_rows
 from harness.core.progress import ProgressCallback
 from harness.results.findings import BenchmarkStatement
@@ -15,6 +16,7 @@ SEEDS = tuple(range(1, 21))
 FAMILIES: dict[str, Callable[[Sequence[int]], Iterable[BenchmarkStatement]]] = {
     "single station": station_rows,
     "first fix": first_fix_rows,
+    "hall": hall_rows,
 }
 """What is measured, and its rows over seeds."""
 
