@@ -75,11 +75,12 @@ def test_default_has_shadow_and_echoes() -> None:
     assert min(open_air[f"{station} hears 3 emitters"] for station in SIX) == 1.0
 
 
-@pytest.mark.parametrize("preset", ["noise", "default"])
-def test_one_station_more_leaves_the_others_as_they_are(preset: str) -> None:
+@pytest.mark.parametrize(("preset", "name"), [("noise", "cave"), ("default", "cave"), ("default", "hall")])
+def test_one_station_more_leaves_the_others_as_they_are(preset: str, name: str) -> None:
     rows = [SIX.index("left_ankle"), SIX.index("head")]
     slot_s = replace(TRACKER, slot_s=0.0)
-    whole, few = (observed(physical(preset), stations, slot_s) for stations in (SIX, ("left_ankle", "head")))
+    noise = physical(preset, Physics(ConstellationSettings(name)))
+    whole, few = (observed(noise, stations, slot_s) for stations in (SIX, ("left_ankle", "head")))
     np.testing.assert_array_equal(positions_m(whole)[:, rows], positions_m(few))
     for station in few.stations:
         assert few.health[f"{station} hears 3 emitters"] == whole.health[f"{station} hears 3 emitters"]

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 from harness.bench import common
 from harness.body import DEFAULT_MOUNTS, build_body, retarget_to_own_body, tpose
 from harness.core import rotations
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
@@ -172,8 +172,8 @@ class _CoveredEmitters:
     def __init__(self, ranging: RangeSource, covered_s: tuple[float, float], slot_s: float) -> None:
         self._ranging, self._covered_s, self._slot_s = ranging, covered_s, slot_s
 
-    def measure_ranges(self, first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
-        ranges = self._ranging.measure_ranges(first_slot, motion, qpos)
+    def measure_ranges(self, first_slot: int, emitter: Ints, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
+        ranges = self._ranging.measure_ranges(first_slot, emitter, motion, qpos)
         time_s = (first_slot + np.arange(len(ranges.emitter))) * self._slot_s
         covered = (time_s >= self._covered_s[0]) & (time_s < self._covered_s[1])
         return replace(ranges, range_m=np.where(covered[:, None, None], np.nan, ranges.range_m))

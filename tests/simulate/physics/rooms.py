@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.body import DEFAULT_MOUNTS, Body
 from harness.core import rotations
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.core.motion import BodyMotion
 from harness.simulate.link import TrackerConfig
 from harness.simulate.physics.constellation import Constellation
@@ -38,6 +38,12 @@ def emitters_at(*position_m: Sequence[float], cone_deg: float = 70.0) -> Constel
 def grid() -> Constellation:
     """The emulator's nine emitters, which face down 2.5 m above the floor."""
     return emitters_at(*(emitter.position_m for emitter in DEFAULT_EMITTERS))
+
+
+def emitters_in_turn(first_slot: int, slots: int, emitters: int = 9) -> Ints:
+    """(F,) the emitter of each slot, one after another."""
+    out: Ints = np.arange(first_slot, first_slot + slots) % emitters
+    return out
 
 
 def placed(room: Room | None = None, centre_m: Floats = ORIGIN_M[:2]) -> PlacedRoom:

@@ -26,6 +26,7 @@ from tests.simulate.physics.free_station import (
     run,
     start,
 )
+from tests.simulate.physics.rooms import emitters_in_turn
 
 SLOTS_PER_S = 80
 
@@ -94,7 +95,12 @@ def test_records_between_ticks_follow_the_motion() -> None:
     start(fusion_filter, station, np.zeros(15))
     outputs = records_every(7, len(station.range_m), fraction=0.5)
     fusion_filter.filter_block(
-        0, station.angle_rad[:, None], station.gain_m_s[:, None], station.range_m[:, None], outputs
+        0,
+        emitters_in_turn(0, len(station.range_m)),
+        station.angle_rad[:, None],
+        station.gain_m_s[:, None],
+        station.range_m[:, None],
+        outputs,
     )
     k = outputs.tick[1:, 0]
     between = 0.5 * (station.position_m[k] + station.position_m[k + 1])
@@ -183,7 +189,12 @@ def test_wrong_shapes_are_refused() -> None:
     station = free_station(1.0, 0)
     with pytest.raises(ShapeError, match="range_m"):
         new_filter().filter_block(
-            0, station.angle_rad[:, None], station.gain_m_s[:, None], station.range_m, records_every(5, 80)
+            0,
+            emitters_in_turn(0, 80),
+            station.angle_rad[:, None],
+            station.gain_m_s[:, None],
+            station.range_m,
+            records_every(5, 80),
         )
 
 

@@ -58,8 +58,8 @@ def test_health_counts_what_the_ranges_say(monkeypatch: pytest.MonkeyPatch) -> N
     tracker, seen = make_tracker(), dict[int, tuple[Ranges, int]]()
     measure = tracker.ranging.measure_ranges
 
-    def watched(first: int, motion: object, qpos: object) -> Ranges:
-        found = measure(first, motion, qpos)  # type: ignore[arg-type]
+    def watched(first: int, *block: object) -> Ranges:
+        found = measure(first, *block)  # type: ignore[arg-type]
         seen.update({first + k: (found, k) for k in range(len(found.emitter))})
         return found
 
@@ -85,3 +85,14 @@ def test_a_part_of_the_records_has_their_values() -> None:
     np.testing.assert_array_equal(some.ranges_received, whole.ranges_received[7::13])
     assert whole.ranges_received.max() == 12
     assert (whole.ranges_rejected <= whole.ranges_received).all()
+
+
+@pytest.mark.parametrize("rate_hz", [120, 200])
+def test_readings_at_common_times_do_not_depend_on_the_rate(rate_hz: int) -> None:
+    """Steps of 1/120 s and of 1/40 s meet at times whose last bits differ, also at the edges of slots."""
+    time_s, step = np.arange(100) * (1.0 / 40.0), rate_hz // 40
+    faster_s = np.arange(100 * step) * (1.0 / rate_hz)
+    assert np.any(faster_s[::step] != time_s)
+    slow, fast = (make_tracker().measure_take(np.repeat(at_s[:, None], 2, axis=1)) for at_s in (time_s, faster_s))
+    np.testing.assert_allclose(fast.position_m[::step], slow.position_m, rtol=0.0, atol=1e-9)
+    np.testing.assert_array_equal(fast.ranges_received[::step], slow.ranges_received)
