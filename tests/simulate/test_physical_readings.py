@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
+from harness.core.stream_health import describe_grown_room
 from harness.errors import BadInput
 from harness.simulate.components.mount import MountOffset, MountSlip, StrapSlip
 from harness.simulate.components.soft_tissue import SoftTissueArtefact
@@ -186,6 +187,20 @@ def test_a_station_out_of_range_hears_nothing() -> None:
 def test_a_room_that_does_not_fit_is_refused(physics: Physics, says: str) -> None:
     with pytest.raises(BadInput, match=says):
         observed(Noise(physics=physics), ("head",))
+
+
+@pytest.mark.parametrize(("seconds", "grown"), [(5.0, False), (30.0, True)])
+def test_a_long_walk_has_a_hall_that_fits(seconds: float, grown: bool) -> None:
+    body, take = performed("walking", seconds)
+    noise = physical("clean", Physics(ConstellationSettings("hall")))
+    health = simulate_tracker(body, take, worn("head", "torso"), TrackerConfig(), noise, seed=SEED).health
+    assert (describe_grown_room(health) != "") == grown
+    extent_m = np.ptp(take.qpos[:, :2], axis=0)
+    if grown:
+        assert extent_m.max() > 11.0
+        assert health["room_emitters"] > 36
+        assert np.all(extent_m + 1.0 <= [health["room_length_m"], health["room_width_m"]])
+    assert min(health["head hears 3 emitters"], health["torso hears 3 emitters"]) > 0.95
 
 
 def test_a_bone_without_a_station_may_not_pass_the_ceiling_either() -> None:

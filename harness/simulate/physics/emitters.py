@@ -1,7 +1,8 @@
 """Emitters of a constellation: what they must fulfil, and files that list them as an IS-900 does (docs/is900.md 6.4).
 
-A file has `MCF` lines. A first line such as `# 9 emitters` says how many follow. It shows that the last line is there;
-an IS-900 does not send it. Without it the numbers have to be those from 1 on, so that any other line is missed.
+A file has `MCF` lines. A first line such as `# 9 emitters` says how many follow, and may go on with their source. It
+shows that the last line is there; an IS-900 does not send it. Without it the numbers have to be those from 1 on, so
+that any other line is missed.
 """
 
 import re
@@ -32,7 +33,7 @@ _KIND = "emitters as `MCF` lists them"
 _LINE = "`31F`, number, position, normal and identity"
 _ADVICE = "docs/is900.md 6.4 describes the lines."
 _LONGEST_LINE = 200
-_COUNT = re.compile(rb"# ([0-9]{1,4}) emitters?")
+_COUNT = re.compile(rb"# ([0-9]{1,4}) emitters?(?: .*)?")
 
 
 class EmitterFault(NamedTuple):

@@ -46,6 +46,20 @@ def test_hall_is_twelve_bars_of_three_that_face_down() -> None:
     np.testing.assert_allclose(hall.position_m.mean(axis=0), 0.0, atol=1e-9)
 
 
+@pytest.mark.parametrize(("name", "heights_m"), [("real_cave", (2.44, 2.59)), ("real_walls", (0.07, 2.98))])
+def test_the_bars_of_real_rooms_are_the_maker_s_and_face_the_performer(
+    name: str, heights_m: tuple[float, float]
+) -> None:
+    """Bars of three emitters, 0.91 m apart (docs/is900.md 13.1)."""
+    room = load_constellation(ConstellationSettings(name=name))
+    height_m = 2.5 - room.position_m[:, 2]
+    assert heights_m[0] < height_m.min() < height_m.max() < heights_m[1]
+    steps_m = np.linalg.norm(np.diff(room.position_m.reshape(6, 3, 3), axis=1), axis=-1)
+    np.testing.assert_allclose(steps_m, 0.91, atol=0.02)
+    towards = np.array([0.0, 0.0, 1.0]) - room.position_m
+    assert np.all(np.sum(towards * room.normal, axis=1) > 0.3)
+
+
 @pytest.mark.parametrize("name", ["cave", "hall"])
 def test_the_lines_of_a_shipped_constellation_are_its_file(name: str, tmp_path: Path) -> None:
     constellation = load_constellation(ConstellationSettings(name=name))

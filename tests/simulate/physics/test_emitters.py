@@ -118,10 +118,12 @@ def test_a_last_line_that_was_cut_is_noticed(tmp_path: Path, head: bytes) -> Non
     assert read_mcf(write(tmp_path, whole[:-2]))[-1].identity == 5004  # the line end alone
 
 
-@pytest.mark.parametrize(("name", "count"), [("cave", 9), ("hall", 36)])
+@pytest.mark.parametrize(("name", "count"), [("cave", 9), ("hall", 36), ("real_cave", 18), ("real_walls", 18)])
 def test_shipped_constellations_announce_their_number(name: str, count: int) -> None:
     path = data_folder("models") / "constellations" / f"{name}.mcf"
-    assert path.read_bytes().startswith(b"# %d emitters\r\n" % count)
+    first = path.read_bytes().split(b"\r\n")[0]
+    assert first.startswith(b"# %d emitters" % count)
+    assert (b" github.com/vrui-vr/vrui, etc/VRDevices.cfg" in first) == name.startswith("real")
     assert len(read_mcf(path)) == count
 
 

@@ -39,6 +39,21 @@ def test_a_path_that_passes_a_wall_or_the_ceiling_is_refused(point: tuple[float,
         check_room(Room(size_m=(6.0, 4.0)), CENTRE_M, "left_hand", path_m)
 
 
+POINTS_M, EMITTERS_M = np.array([[5.4, -1.0], [-3.0, 5.5]]), np.array([[-2.0, 1.0, 2.5], [1.0, 0.0, 0.1]])
+
+
+def test_sizes_that_are_left_open_hold_motion_and_emitters() -> None:
+    assert Room().fit(POINTS_M, EMITTERS_M).extent_m == Room().extent_m == (12.0, 12.0, 2.6)
+    assert Room().fit(POINTS_M - [0.2, 0.0], EMITTERS_M).extent_m == (12.0, 12.0, 2.6)
+    assert Room().fit(POINTS_M + 0.2, EMITTERS_M).extent_m == (13.0, 13.0, 2.6)
+    assert Room().fit(POINTS_M, EMITTERS_M - [4.0, 0.0, -0.5]).extent_m == (13.0, 12.0, 3.1)
+
+
+def test_sizes_that_are_given_stay() -> None:
+    assert Room((6.0, 4.0)).fit(POINTS_M, EMITTERS_M - [0.0, 0.0, -0.5]).extent_m == (6.0, 4.0, 3.1)
+    assert Room(height_m=2.2).fit(POINTS_M + 2.0, EMITTERS_M).extent_m == (16.0, 16.0, 2.2)
+
+
 def test_a_path_inside_is_accepted_and_so_is_a_foot_below_the_floor() -> None:
     check_room(Room(size_m=(6.0, 4.0)), CENTRE_M, "left_foot", np.array([[3.9, -0.1, -0.01], [-1.9, -3.9, 2.59]]))
 
