@@ -17,7 +17,7 @@ from harness.simulate.physics.constellation import Constellation, check_reach, l
 from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.line_of_sight import LineOfSight
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s
-from harness.simulate.physics.room import PlacedRoom, Room, check_emitters, check_room, place_room
+from harness.simulate.physics.room import PlacedRoom, Room, check_room, fit_room, place_room
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.station_displacement import BodyMotionSource, StationDisplacement
 from harness.simulate.readings import FilterReadings, SimulatedReadings
@@ -90,14 +90,12 @@ def place_constellation(
     centre_m = middle_of_path_m(root_m) if settings.centre_m is None else np.array(settings.centre_m)
     half_x, half_y = np.max(np.abs(root_m[:, :2] - centre_m), axis=0).tolist()
     constellation = load_constellation(settings, (half_x, half_y))
-    check_emitters(physics.room, float(origin_m[2]), constellation.number, constellation.position_m)
     time_s = np.arange(0.0, trajectory.duration_s, 1.0 / _CHECKED_HZ)
     stations = trajectory.station_motion(calibration, np.repeat(time_s[:, None], len(calibration.stations), axis=1))
     skeleton = trajectory.body.skeleton
     end_m = pose_from_qpos(skeleton, trajectory.qpos(time_s)).end_m
     everything_m = np.concatenate([stations.position_m, end_m], axis=1)[..., :2].reshape(-1, 2)
-    hanging_m = constellation.position_m * [1.0, 1.0, -1.0] + [0.0, 0.0, origin_m[2]]  # the frame's z points down
-    room = physics.room.fit(everything_m - centre_m, hanging_m)
+    room = fit_room(physics.room, constellation, float(origin_m[2]), everything_m - centre_m)
     for row, station in enumerate(calibration.stations):
         check_room(room, centre_m, f"station {station}", stations.position_m[:, row])
     for row, bone in enumerate(skeleton.names):

@@ -180,8 +180,8 @@ def test_a_station_out_of_range_hears_nothing() -> None:
             Physics(room=Room(size_m=(3.0, 3.0)), constellation=ConstellationSettings(centre_m=(2.0, 0.0))),
             "station head reaches x",
         ),
-        (Physics(room=Room(height_m=2.0)), "above the ceiling"),
-        (Physics(room=Room(size_m=(1.5, 1.5))), "outside the walls"),
+        (Physics(room=Room(height_m=2.0)), "emitter 1 reaches z"),
+        (Physics(room=Room(size_m=(1.5, 1.5))), "emitter 1 reaches x"),
     ],
 )
 def test_a_room_that_does_not_fit_is_refused(physics: Physics, says: str) -> None:

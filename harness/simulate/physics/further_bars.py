@@ -34,12 +34,11 @@ def further_bars(half_m: tuple[float, float]) -> tuple[Emitter, ...]:
     out: list[Emitter] = []
     for place, (column, row) in enumerate(_places()):
         if abs(column) <= wanted[0] / 2 and abs(row) <= wanted[1] / 2:
-            along = round(row + column + (sum(SHIPPED) - 2) / 2) % 2
+            along_y = round(row + column + (sum(SHIPPED) - 2) / 2) % 2
             for n in range(3):
-                at_m = [column * STEP_M[0], row * STEP_M[1], 0.0]
-                at_m[along] += (n - 1) * SPACING_M
-                number = 3 * place + n
-                out.append(Emitter(_FIRST_NUMBER + number, tuple(at_m), (0.0, 0.0, 1.0), _FIRST_IDENTITY + number))
+                shift_m, number = (n - 1) * SPACING_M, 3 * place + n
+                at_m = column * STEP_M[0] + shift_m * (1 - along_y), row * STEP_M[1] + shift_m * along_y, 0.0
+                out.append(Emitter(_FIRST_NUMBER + number, at_m, (0.0, 0.0, 1.0), _FIRST_IDENTITY + number))
     return tuple(out)
 
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Floats, Ints, freeze
+from harness.core.arrays import Floats, freeze
 from harness.core.calibration import Calibration
 from harness.core.ranges import CheckedFields, Range, check_fields
 from harness.errors import BadInput
@@ -59,17 +59,6 @@ class Room:
     def extent_m(self) -> tuple[float, float, float]:
         """Length along x and y and height [m]; the least one where it is left open."""
         return *(self.size_m or SMALLEST_M[:2]), self.height_m or SMALLEST_M[2]
-
-    def fit(self, points_m: Floats, emitters_m: Floats) -> "Room":
-        """The room with the sizes that it leaves open: they hold points (N, 2) and emitters (J, 3) [m].
-
-        Points are horizontal, from the middle of the room; the emitters' third number is their height. Walls are whole
-        metres apart.
-        """
-        reach_m = np.max(np.abs(np.concatenate([points_m, emitters_m[:, :2]])), axis=0)
-        length, width = np.maximum(SMALLEST_M[:2], np.ceil(2.0 * (reach_m + _WALL_GAP_M))).tolist()
-        height = max(SMALLEST_M[2], float(np.max(emitters_m[:, 2])) + _CEILING_GAP_M)
-        return replace(self, size_m=self.size_m or (length, width), height_m=self.height_m or height)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,19 +122,17 @@ def check_room(room: Room, centre_m: Floats, name: str, position_m: Floats) -> N
     )
 
 
-def check_emitters(room: Room, origin_height_m: float, number: Ints, position_m: Floats) -> None:
-    """BadInput if one of J emitters hangs outside the walls or above the ceiling, where the room says where these are.
+def fit_room(room: Room, constellation: Constellation, origin_height_m: float, points_m: Floats) -> Room:
+    """The room with the sizes that it leaves open: they hold J emitters and points (N, 2), from its middle [m].
 
-    `position_m` (J, 3) are their places by their numbers (J,), in a tracker's frame whose origin is `origin_height_m`
-    above the middle of the floor [m].
+    The constellation is in a tracker's frame whose origin is `origin_height_m` above the middle of the floor [m]. Walls
+    are whole metres apart. BadInput if an emitter hangs outside the walls or above the ceiling.
     """
-    length, width = room.size_m or (np.inf, np.inf)
-    ceiling_m = room.height_m or np.inf
-    for name, (x, y, z) in zip(number.tolist(), position_m.tolist(), strict=True):
-        height_m = origin_height_m - z  # the frame's z points down
-        if abs(x) > length / 2 or abs(y) > width / 2:
-            found = f"Emitter {name} hangs outside the walls, at ({x:.2f}, {y:.2f}) m from the middle of the room."
-            raise BadInput(found, "Make physics.room.size_m larger.")
-        if height_m > ceiling_m:
-            found = f"Emitter {name} hangs at {height_m:.2f} m, above the ceiling at {ceiling_m:.2f} m."
-            raise BadInput(found, "Make physics.room.height_m larger, or tracker.origin_m lower.")
+    hanging_m = constellation.position_m * [1.0, 1.0, -1.0] + [0.0, 0.0, origin_height_m]  # the frame's z points down
+    reach_m = np.max(np.abs(np.concatenate([points_m, hanging_m[:, :2]])), axis=0)
+    length, width = np.maximum(SMALLEST_M[:2], np.ceil(2.0 * (reach_m + _WALL_GAP_M))).tolist()
+    height = max(SMALLEST_M[2], float(np.max(hanging_m[:, 2])) + _CEILING_GAP_M)
+    out = replace(room, size_m=room.size_m or (length, width), height_m=room.height_m or height)
+    for number, place_m in zip(constellation.number.tolist(), hanging_m, strict=True):
+        check_room(out, np.zeros(2), f"emitter {number}", place_m[None])
+    return out
