@@ -116,10 +116,6 @@ class Constellation:
         rows = zip(*(column.tolist() for column in columns), strict=True)
         return tuple(Emitter(number, tuple(at), tuple(normal), identity) for number, at, normal, identity in rows)
 
-    def lines(self) -> bytes:
-        """The reply to `MCF`."""
-        return b"".join(emitter.line() for emitter in self.emitters)
-
     def translate(self, offset_m: Floats) -> "Constellation":
         """The constellation moved by an offset (3,) in the tracker's axes [m]."""
         return replace(self, position_m=self.position_m + offset_m)

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.core.files import write_bytes
 from harness.core.input_file import MEGABYTE, read_input_file
 from harness.errors import BadFile, shorten
 from harness.stream.polhemus.codec import Emitter, parse_reply
@@ -131,12 +130,6 @@ def _find_lost(data: bytes, emitters: Sequence[Emitter], announced: int | None) 
     if not data.endswith((b"\n", b"\r")) and len(lines[-1]) < max(map(len, lines)):
         return "a last line that is shorter than others and has no end"
     return ""
-
-
-def write_mcf(path: Path, emitters: Sequence[Emitter]) -> None:
-    """Write their number, then emitters as the device sends them; positions have 4 decimals, normals 2."""
-    lines = (emitter.line() for emitter in emitters)
-    write_bytes(path, b"# %d emitters\r\n%b" % (len(emitters), b"".join(lines)))
 
 
 def _parse_line(line: bytes) -> Emitter | None:

@@ -76,11 +76,6 @@ class PlacedRoom:
     def __post_init__(self) -> None:
         freeze(self, centre_m=(2,), world_from_tracker=(4,), origin_m=(3,))
 
-    def to_world(self, position_m: Floats) -> Floats:
-        """Points (..., 3) of the tracker's frame in world axes [m]."""
-        out: Floats = rotations.rotate(self.world_from_tracker, position_m) + self.origin_m
-        return out
-
     def planes(self) -> Floats:
         """(6, 4) floor, ceiling and walls in the tracker's frame: outward unit normal and distance along it [m]."""
         (x, y), (length, width, height) = self.centre_m, self.room.extent_m

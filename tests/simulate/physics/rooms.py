@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from harness.simulate.physics.schedule import TICKS_PER_SLOT
 from harness.simulate.simulation import WORLD_FROM_TRACKER, exact_calibration
 from harness.simulate.trajectory import Trajectory
 from harness.stream.polhemus import DEFAULT_EMITTERS
+from harness.stream.polhemus.codec import Emitter
 
 TICK_HZ = 400.0
 ORIGIN_M = np.array(TrackerConfig().origin_m)
@@ -33,6 +35,13 @@ def emitters_at(*position_m: Sequence[float], cone_deg: float = 70.0) -> Constel
         cone_rad=math.radians(cone_deg),
         range_m=4.0,
     )
+
+
+def write_mcf(folder: Path, emitters: Sequence[Emitter]) -> Path:
+    """A file of the lines that the device sends."""
+    path = folder / "room.mcf"
+    path.write_bytes(b"".join(emitter.line() for emitter in emitters))
+    return path
 
 
 def grid() -> Constellation:

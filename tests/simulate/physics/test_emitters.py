@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from harness.core.package_data import data_folder
 from harness.errors import BadFile
-from harness.simulate.physics.emitters import MAX_MCF_BYTES, read_mcf, write_mcf
+from harness.simulate.physics.emitters import MAX_MCF_BYTES, read_mcf
 from harness.stream.polhemus.codec import Emitter
+from tests.simulate.physics.rooms import write_mcf
 
 LINE = b"31F      1   -0.9144   -0.6096    0.0000   0.00   0.00   1.00   5001\r\n"
 OTHERS = [
@@ -40,15 +41,13 @@ def test_emitters_are_read_as_they_were_written(
         x, y, z = (vector / np.linalg.norm(vector)).tolist()
         apart = (place[0] + 101.0 * number, place[1], place[2])
         emitters.append(Emitter(number, apart, (x, y, z), 5000 + number))
-    path = tmp_path_factory.mktemp("mcf") / "a.mcf"
-    write_mcf(path, emitters)
+    path = write_mcf(tmp_path_factory.mktemp("mcf"), emitters)
     found = read_mcf(path)
     assert [(e.number, e.identity) for e in found] == [(e.number, e.identity) for e in emitters]
     np.testing.assert_allclose([e.position_m for e in found], [e.position_m for e in emitters], atol=0.5001e-4)
     np.testing.assert_allclose([e.normal for e in found], [e.normal for e in emitters], atol=0.5001e-2)
     written = path.read_bytes()
-    write_mcf(path, found)
-    assert path.read_bytes() == written
+    assert write_mcf(path.parent, found).read_bytes() == written
 
 
 @pytest.mark.parametrize("end", [b"\n", b"\r", b"\r\n", b"\r\n\r\n", b" \r\n"])
