@@ -85,10 +85,7 @@ def _fire(emitter_m: Floats, near: int, performer_m: Floats, first_slot: int, la
             away_m2[j] = 0.0
             for i in range(3):
                 away_m2[j] += (emitter_m[j, i] - performer_m[f, i]) ** 2
-        reach_m2 = np.sort(away_m2)[near - 1]
-        chosen = -1
-        for j in range(len(emitter_m)):
-            if away_m2[j] <= reach_m2 and (chosen < 0 or last[j] < last[chosen]):
-                chosen = j
+        nearest = np.argsort(away_m2, kind="mergesort")[:near]
+        chosen = nearest[np.argmin(last[nearest])]
         last[chosen] = first_slot + f
         out[f] = chosen

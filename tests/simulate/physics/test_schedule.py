@@ -48,6 +48,12 @@ def test_of_many_emitters_the_nearest_fire_in_turn() -> None:
     assert Schedule(400.0, len(HALL_M)).turn_slots == NEAR_EMITTERS
 
 
+def test_of_emitters_that_are_equally_far_the_first_fire() -> None:
+    around_m = [[np.cos(a), np.sin(a), 0.0] for a in np.pi / 2.0 * np.arange(4)]
+    fired = FiringOrder(np.array(around_m).round(9), 3, 0).next_emitters(standing(9))
+    np.testing.assert_array_equal(fired, np.arange(9) % 3)
+
+
 def test_a_new_emitter_fires_first_where_the_performer_walks() -> None:
     order = FiringOrder(HALL_M, NEAR_EMITTERS, 0)
     before = order.next_emitters(standing(2 * NEAR_EMITTERS))
