@@ -12,6 +12,8 @@ from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.filter_state import Outputs
 from harness.simulate.physics.fusion import FusionFilter
 from harness.simulate.physics.inertial import Inertial
+from harness.simulate.physics.schedule import NEAR_EMITTERS, Schedule
+from harness.simulate.physics.sound import Sound
 from tests.simulate.physics.free_station import (
     EMITTER_M,
     EXACT,
@@ -183,6 +185,19 @@ def test_the_spread_at_rest_is_the_published_one() -> None:
         spreads.append(float(np.sqrt(np.sum(np.var(settled, axis=0)))))
     print("spread at rest [mm]:", *(f"{1e3 * spread:.2f}" for spread in spreads))
     assert 0.001 < np.median(spreads) < 0.002
+
+
+def test_windows_do_not_grow_with_emitters_that_do_not_fire() -> None:
+    models = [
+        FusionFilter(
+            *(Fusion(), Sound(), Inertial(), np.zeros((count, 3)), np.tile([0.0, 0.0, 1.0], (count, 1))),
+            Schedule(TICK_HZ, count),
+            ["a"],
+        ).model
+        for count in (NEAR_EMITTERS, 4 * NEAR_EMITTERS)
+    ]
+    assert models[0].window_s == models[1].window_s
+    assert models[0].confirmation_slots == models[1].confirmation_slots
 
 
 def test_wrong_shapes_are_refused() -> None:

@@ -8,6 +8,7 @@ import pytest
 from harness.simulate.components.soft_tissue import skin_below
 from harness.simulate.noise import Noise
 from harness.simulate.physical_readings import place_constellation
+from harness.simulate.physics.constellation import ConstellationSettings
 from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.line_of_sight import LineOfSight
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s, lead_in_slots
@@ -40,11 +41,11 @@ def test_the_lead_in_is_a_whole_number_of_slots() -> None:
     assert lead_in_s(physics) == pytest.approx(34 * 5 / 333.3)
 
 
-def make_tracker() -> PhysicalTracker:
-    """The chest and left ankle of the boxer, who boxes for 3 s below `cave`."""
+def make_tracker(name: str = "cave") -> PhysicalTracker:
+    """The chest and left ankle of the boxer, who boxes for 3 s below a constellation."""
     (body, take), mounts = performed(), worn("left_ankle", "torso")
     calibration = exact_calibration(body, mounts, TRACKER)
-    physics, trajectory = Physics(), Trajectory(body, take)
+    physics, trajectory = Physics(ConstellationSettings(name)), Trajectory(body, take)
     constellation, placed = place_constellation(trajectory, calibration, physics)
     whole = trajectory.with_lead_in(lead_in_s(physics)).with_lead_out(0.5)
     skin = skin_below(body.skeleton, mounts, calibration)
@@ -53,9 +54,10 @@ def make_tracker() -> PhysicalTracker:
     return PhysicalTracker(source, physics, constellation, placed, LineOfSight(body, placed), seed=1, take="t")
 
 
-def test_health_counts_what_the_ranges_say(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", ["cave", "hall"])
+def test_health_counts_what_the_ranges_say(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Counted again by hand: three emitters heard within the last turn, and the share of echoes, from time 0 on."""
-    tracker, seen = make_tracker(), dict[int, tuple[Ranges, int]]()
+    tracker, seen = make_tracker(name), dict[int, tuple[Ranges, int]]()
     measure = tracker.ranging.measure_ranges
 
     def watched(first: int, *block: object) -> Ranges:
