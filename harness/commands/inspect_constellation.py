@@ -85,7 +85,7 @@ def _content(args: argparse.Namespace, constellation: Constellation) -> Coverage
     from harness.simulate.physics import Inertial, Schedule
 
     extent_m = np.ptp(constellation.position_m, axis=0)
-    turn_s = len(constellation) * Schedule(Inertial().rate_hz, len(constellation)).slot_s
+    schedule = Schedule(Inertial().rate_hz, len(constellation))
     floor_m = TrackerConfig().origin_m[2]
     x_m, y_m = plan_axes_m(constellation)
     views = []
@@ -98,7 +98,7 @@ def _content(args: argparse.Namespace, constellation: Constellation) -> Coverage
         name=args.file.stem,
         emitters=f"{len(constellation)} emitters on {' x '.join(f'{each:.2f}' for each in extent_m)} m",
         reach=f"{constellation.range_m:g} m within {np.rad2deg(constellation.cone_rad):.0f} deg of each axis",
-        turn=f"{turn_s:.3f} s for a turn of all emitters",
+        turn=f"{schedule.turn_slots * schedule.slot_s:.3f} s for a turn of the {schedule.turn_slots} nearest",
         emitter_m=constellation.position_m,
         half_m=SIDE_M / 2,
         views=views,

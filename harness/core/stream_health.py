@@ -97,6 +97,18 @@ def hearing_key(station: str) -> str:
     return station + _ENDING
 
 
+GROWN_ROOM = "room_length_m", "room_width_m", "room_height_m", "room_emitters"
+"""Keys in the stream's health of a room that is larger than usual: its sizes [m] and its number of emitters."""
+
+
+def describe_grown_room(health: Mapping[str, float]) -> str:
+    """A sentence on a room that motion or emitters have made larger than usual; "" without one."""
+    if GROWN_ROOM[0] not in health:
+        return ""
+    length, width, height, emitters = (health[key] for key in GROWN_ROOM)
+    return f"the room is {length:g} m by {width:g} m and {height:.2f} m high, with {emitters:.0f} emitters"
+
+
 def poor_hearing(health: Mapping[str, float]) -> str:
     """A sentence on the stations that hear enough emitters for less than half of the time; "" if there are none."""
     shares = {key.removesuffix(_ENDING): share for key, share in health.items() if key.endswith(_ENDING)}

@@ -27,7 +27,7 @@ from harness.core.motion import BodyMotion, Clip, count_steps
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.core.split import ClipPart, ExampleLeak, allowed_frames, forbidden_frames, refuse_leak, select_examples
-from harness.core.stream_health import poor_hearing
+from harness.core.stream_health import describe_grown_room, poor_hearing
 from harness.errors import BadInput
 from harness.experiment.example_subset import keep_share
 from harness.experiment.methods.remote_method import NamedMethod
@@ -390,11 +390,12 @@ class ClipEvaluation:
         }
 
     def notes(self, method: Method) -> tuple[str, ...]:
-        """Notes for readers: on the clip, the calibration, stations that hear too few emitters, and retargeting."""
+        """Notes for readers: on the clip, the calibration, the room of a physical tracker, and retargeting."""
         reports = [self.subject.retarget_report, *(self.training.retarget_reports if method.needs_examples else [])]
         known = [report for report in reports if report is not None]
-        hearing = poor_hearing(self.simulation.health)
-        notes = (*self.subject.clip.notes, *self.performer_calibration.notes, *([hearing] if hearing else []))
+        health = self.simulation.health
+        room = filter(None, (poor_hearing(health), describe_grown_room(health)))
+        notes = (*self.subject.clip.notes, *self.performer_calibration.notes, *room)
         if not known:
             return notes
         deviation_mm = np.mean([report.deviation_mm for report in known])

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from harness.simulate.link import TrackerConfig, transmit
     from harness.simulate.loop import loop_motion, simulate_loop
     from harness.simulate.noise import STATISTICAL_COMPONENTS, Noise, noise_preset
-    from harness.simulate.readings import GRAVITY_M_S2, SimulatedReadings
+    from harness.simulate.readings import GRAVITY_M_S2, FilterReadings, SimulatedReadings
     from harness.simulate.simulation import (
         WORLD_FROM_TRACKER,
         Simulation,
@@ -46,6 +46,7 @@ __all__ = [
     "Dropout",
     "Echo",
     "Excursion",
+    "FilterReadings",
     "LostStation",
     "Noise",
     "SessionBias",

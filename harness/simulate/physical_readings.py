@@ -17,7 +17,7 @@ from harness.simulate.physics.constellation import Constellation, check_reach, l
 from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.line_of_sight import LineOfSight
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s
-from harness.simulate.physics.room import PlacedRoom, check_emitters, check_room, place_room
+from harness.simulate.physics.room import PlacedRoom, Room, check_room, fit_room, place_room
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.station_displacement import BodyMotionSource, StationDisplacement
 from harness.simulate.readings import FilterReadings, SimulatedReadings
@@ -42,15 +42,14 @@ def simulate_physical_readings(
     take: str,
     session: str = "",
     ends_s: float | None = None,
-) -> tuple[FilterReadings, Constellation]:
-    """Readings at the times (E, S) of a trajectory, and the constellation that the device knows.
+) -> tuple[FilterReadings, Constellation, Room]:
+    """Readings at the times (E, S) of a trajectory, the constellation that the device knows, and the room.
 
     `calibration` is the exact one. `ends_s` is the last sampling time of the take, when a way back follows it [s].
     `take` and `session` key the random draws. BadInput when the room is too small for the motion or the emitters, and
     when no emitter is within reach.
     """
     constellation, placed = place_constellation(trajectory, calibration, physics)
-    _check_path(trajectory, calibration, constellation, placed)
     whole = trajectory.with_lead_in(lead_in_s(physics))
     if whole.ends_s == trajectory.duration_s:
         whole = whole.with_lead_out(_LEAD_OUT_S)
@@ -74,43 +73,38 @@ def simulate_physical_readings(
         take=take,
         session=session,
     )
-    return tracker.measure_take(time_s), constellation
+    return tracker.measure_take(time_s), constellation, placed.room
 
 
 def place_constellation(
     trajectory: Trajectory, calibration: Calibration, physics: Physics
 ) -> tuple[Constellation, PlacedRoom]:
-    """The constellation in the tracker's frame, and the room around it.
+    """The constellation in the tracker's frame, and the room around it, which holds the take's path.
 
-    Both lie above the middle of the take's path, unless `constellation.centre_m` says otherwise.
+    Both lie above the middle of the root's path, unless `constellation.centre_m` says otherwise. BadInput if a station
+    or the end of a bone leaves the room, and if no emitter is within reach.
     """
-    settings = physics.constellation
-    if settings.centre_m is None:
-        frames = max(round(trajectory.duration_s * _CHECKED_HZ), 1) + 1
-        path = trajectory.qpos(np.linspace(0.0, trajectory.duration_s, frames))
-        centre_m = np.round(middle_of_path_m(path[:, :3]), 2)
-    else:
-        centre_m = np.array(settings.centre_m)
-    constellation = load_constellation(settings)
-    check_emitters(physics.room, float(calibration.tracker_origin_m[2]), constellation.number, constellation.position_m)
-    return place_room(physics.room, constellation, centre_m, calibration)
-
-
-def _check_path(
-    trajectory: Trajectory, calibration: Calibration, constellation: Constellation, placed: PlacedRoom
-) -> None:
-    """BadInput if a station or the end of a bone leaves the room, and if no emitter is within reach."""
+    settings, origin_m = physics.constellation, calibration.tracker_origin_m
+    frames = max(round(trajectory.duration_s * _CHECKED_HZ), 1) + 1
+    root_m = trajectory.qpos(np.linspace(0.0, trajectory.duration_s, frames))[:, :3]
+    centre_m = middle_of_path_m(root_m) if settings.centre_m is None else np.array(settings.centre_m)
+    half_x, half_y = np.max(np.abs(root_m[:, :2] - centre_m), axis=0).tolist()
+    constellation = load_constellation(settings, (half_x, half_y))
     time_s = np.arange(0.0, trajectory.duration_s, 1.0 / _CHECKED_HZ)
     stations = trajectory.station_motion(calibration, np.repeat(time_s[:, None], len(calibration.stations), axis=1))
     skeleton = trajectory.body.skeleton
     end_m = pose_from_qpos(skeleton, trajectory.qpos(time_s)).end_m
+    everything_m = np.concatenate([stations.position_m, end_m], axis=1)[..., :2].reshape(-1, 2)
+    room = fit_room(physics.room, constellation, float(origin_m[2]), everything_m - centre_m)
     for row, station in enumerate(calibration.stations):
-        check_room(placed.room, placed.centre_m, f"station {station}", stations.position_m[:, row])
+        check_room(room, centre_m, f"station {station}", stations.position_m[:, row])
     for row, bone in enumerate(skeleton.names):
-        check_room(placed.room, placed.centre_m, f"bone {bone}", end_m[:, row])
+        check_room(room, centre_m, f"bone {bone}", end_m[:, row])
+    constellation, placed = place_room(room, constellation, centre_m, calibration)
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
-    places_m = rotations.rotate(tracker_from_world, stations.position_m - calibration.tracker_origin_m)
+    places_m = rotations.rotate(tracker_from_world, stations.position_m - origin_m)
     check_reach(constellation, places_m.reshape(-1, 3))
+    return constellation, placed
 
 
 def filter_samples(readings: SimulatedReadings, fusion: Fusion) -> FilterSamples:

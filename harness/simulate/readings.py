@@ -78,6 +78,8 @@ class SimulatedReadings:
     """What the filter of a physical tracker reports; its poses and qualities are those above before the faults."""
     emitters: tuple[Emitter, ...] = ()
     """The constellation of a physical tracker."""
+    grown_room_m: tuple[float, float, float] | None = None
+    """Length, width and height of its room, whose walls motion or emitters have moved out [m]."""
 
     def take_rng(self, component: str, station: str) -> np.random.Generator:
         """Random generator of one component at one station in this take, independent of all others."""

@@ -11,7 +11,7 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion, count_steps
-from harness.core.stream_health import hearing_key
+from harness.core.stream_health import GROWN_ROOM, hearing_key
 from harness.errors import BadInput
 from harness.simulate.components.soft_tissue import skin_below, tissue_force_m_s2
 from harness.simulate.link import TrackerConfig, transmit
@@ -158,7 +158,7 @@ def simulate_readings(
     if noise.physics is None:
         measured = _ideal_readings(trajectory, calibration, time_s)
     else:
-        found, constellation = simulate_physical_readings(
+        found, constellation, room = simulate_physical_readings(
             *(trajectory, mounts, calibration, noise, noise.physics, time_s),
             seed=seed,
             take=take,
@@ -174,6 +174,7 @@ def simulate_readings(
             "quality": found.quality,
             "filter": found,
             "emitters": constellation.emitters,
+            "grown_room_m": None if room.extent_m[:2] == noise.physics.room.extent_m[:2] else room.extent_m,
         }
     readings = SimulatedReadings(
         seed=seed,
@@ -248,6 +249,8 @@ def _health(
             readings.stations, readings.filter.coverage_share, readings.filter.echo_share, strict=True
         ):
             counts |= {hearing_key(station): float(hears), f"{station} echoes": float(echoes)}
+    if readings.grown_room_m is not None:
+        counts |= dict(zip(GROWN_ROOM, (*readings.grown_room_m, float(len(readings.emitters))), strict=True))
     return {
         "frames_sampled": float(len(readings.time_s)),
         "frames_received": float(len(frames)),

@@ -23,7 +23,7 @@ def test_it_prints_the_coverage_and_writes_a_page(tmp_path: Path, command: Comma
     lines = shown.out.splitlines()
     assert lines[0].startswith("9 emitters: three or more are heard in 100 % of the cube")
     assert "emitters: 9 emitters on 1.83 x 1.22 x 0.00 m" in lines
-    assert "turn: 0.113 s for a turn of all emitters" in lines
+    assert "turn: 0.113 s for a turn of the 9 nearest" in lines
     table = lines[lines.index("by place") + 1 :]
     assert [line.split()[0] for line in table[:5]] == ["height", "0", "0.3", "1", "1.7"]
     assert lines[-2:] == ["page: results/coverage/room.html", "pass"]

@@ -1,6 +1,6 @@
 """Stations that hear too few emitters, in a sentence."""
 
-from harness.core.stream_health import hearing_key, poor_hearing
+from harness.core.stream_health import GROWN_ROOM, describe_grown_room, hearing_key, poor_hearing
 
 
 def test_stations_below_half_of_the_time_are_named() -> None:
@@ -16,3 +16,9 @@ def test_stations_below_half_of_the_time_are_named() -> None:
 def test_nothing_is_said_without_physics_or_with_enough_emitters() -> None:
     assert poor_hearing({"records_sent": 0.0}) == ""
     assert poor_hearing({hearing_key("head"): 0.51}) == ""
+
+
+def test_a_room_that_grew_is_described() -> None:
+    health = dict(zip(GROWN_ROOM, (16.0, 12.0, 2.6, 54.0), strict=True))
+    assert describe_grown_room(health) == "the room is 16 m by 12 m and 2.60 m high, with 54 emitters"
+    assert describe_grown_room({"records_sent": 0.0}) == ""

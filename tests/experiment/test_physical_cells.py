@@ -21,6 +21,7 @@ from harness.reconstruct import make_method
 from harness.report.run.text import run_table
 from harness.results import read_summary
 from harness.simulate.physics import ConstellationSettings, Physics, Sound
+from harness.stream.polhemus import DEFAULT_EMITTERS
 from harness.stream.recording import RecordingStream, record_capture
 
 PLAIN = Scenario(
@@ -84,6 +85,14 @@ def test_a_station_that_hears_too_little_is_noted(tmp_path: Path) -> None:
     assert not any("hears" in text for text in evaluation(PHYSICAL).notes(make_method("ik:previous")))
     engine.run(deaf, tmp_path / "out")
     assert f"TOO FEW EMITTERS IN boxing_p1_01: {note}" in run_table(read_summary(tmp_path / "out"))
+
+
+def test_a_room_whose_walls_moved_is_noted() -> None:
+    far = replace(DEFAULT_EMITTERS[0], number=10, position_m=(7.0, 0.0, 0.0))
+    physics = Physics(ConstellationSettings(emitters=(*DEFAULT_EMITTERS, far)))
+    notes = [evaluation(replace(PHYSICAL, physics=p)).notes(make_method("ik:previous")) for p in (physics, Physics())]
+    note = "the room is 15 m by 12 m and 2.60 m high, with 10 emitters"
+    assert [note in each for each in notes] == [True, False]
 
 
 SCENARIO = """

@@ -75,9 +75,13 @@ def checked(path: Path) -> Scenario:
         ("[physics]\nfusion.enhancement = { hed = 1 }", UnknownName, "enhancement called 'hed'. Did you mean 'head'"),
         ("[physics]\nfusion.prediction_ms = { head = 51 }", BadFile, "prediction_ms.head = 51 must be"),
         ("[physics]\nfusion.enhancement = { head = 3 }", BadFile, "enhancement.head = 3 must be"),
-        ('[physics]\nconstellation.name = "hall"\nroom.size_m = [5.0, 5.0]', BadInput, "hangs outside the walls"),
-        ("[physics]\nroom.height_m = 2.0", BadInput, "hangs at 2.50 m, above the ceiling at 2.00 m"),
-        ("[physics]\n[tracker]\norigin_m = [0.0, 0.0, 3.0]", BadInput, "hangs at 3.00 m, above the ceiling"),
+        ('[physics]\nconstellation.name = "hall"\nroom.size_m = [5.0, 5.0]', BadInput, "emitter 1 reaches x = -4.57 m"),
+        ("[physics]\nroom.height_m = 2.0", BadInput, "emitter 1 reaches z = 2.50 m, and the ceiling is at 2.00 m"),
+        (
+            "[physics]\nroom.height_m = 2.6\n[tracker]\norigin_m = [0, 0, 3]",
+            BadInput,
+            "emitter 1 reaches z = 3.00 m",
+        ),
         (f"[physics]\n{SLIP}", BadInput, "infinite acceleration"),
         ("[physics]\n[components.strap_slip]\nover_s = 0.0", BadInput, "infinite acceleration"),
         ("[components.physics]", BadInput, "components.physics is no component"),
@@ -194,7 +198,7 @@ def test_a_study_is_refused_as_a_scenario_is(changes: str, kind: type[HarnessErr
     ("extra", "says"),
     [
         ("[physics]\nconstellation.centre_m = [50.0, 0.0]\nroom.size_m = [150.0, 150.0]", "within reach of an emitter"),
-        ("[physics]\nconstellation.centre_m = [6.0, 0.0]", "The room is too small"),
+        ("[physics]\nconstellation.centre_m = [6.0, 0.0]\nroom.size_m = [12.0, 12.0]", "The room is too small"),
     ],
 )
 def test_a_performer_elsewhere_is_refused_by_the_emulator(extra: str, says: str, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
+from harness.core.stream_health import describe_grown_room
 from harness.errors import BadInput
 from harness.simulate.components.mount import MountOffset, MountSlip, StrapSlip
 from harness.simulate.components.soft_tissue import SoftTissueArtefact
@@ -75,11 +76,12 @@ def test_default_has_shadow_and_echoes() -> None:
     assert min(open_air[f"{station} hears 3 emitters"] for station in SIX) == 1.0
 
 
-@pytest.mark.parametrize("preset", ["noise", "default"])
-def test_one_station_more_leaves_the_others_as_they_are(preset: str) -> None:
+@pytest.mark.parametrize(("preset", "name"), [("noise", "cave"), ("default", "cave"), ("default", "hall")])
+def test_one_station_more_leaves_the_others_as_they_are(preset: str, name: str) -> None:
     rows = [SIX.index("left_ankle"), SIX.index("head")]
     slot_s = replace(TRACKER, slot_s=0.0)
-    whole, few = (observed(physical(preset), stations, slot_s) for stations in (SIX, ("left_ankle", "head")))
+    noise = physical(preset, Physics(ConstellationSettings(name)))
+    whole, few = (observed(noise, stations, slot_s) for stations in (SIX, ("left_ankle", "head")))
     np.testing.assert_array_equal(positions_m(whole)[:, rows], positions_m(few))
     for station in few.stations:
         assert few.health[f"{station} hears 3 emitters"] == whole.health[f"{station} hears 3 emitters"]
@@ -178,13 +180,27 @@ def test_a_station_out_of_range_hears_nothing() -> None:
             Physics(room=Room(size_m=(3.0, 3.0)), constellation=ConstellationSettings(centre_m=(2.0, 0.0))),
             "station head reaches x",
         ),
-        (Physics(room=Room(height_m=2.0)), "above the ceiling"),
-        (Physics(room=Room(size_m=(1.5, 1.5))), "outside the walls"),
+        (Physics(room=Room(height_m=2.0)), "emitter 1 reaches z"),
+        (Physics(room=Room(size_m=(1.5, 1.5))), "emitter 1 reaches x"),
     ],
 )
 def test_a_room_that_does_not_fit_is_refused(physics: Physics, says: str) -> None:
     with pytest.raises(BadInput, match=says):
         observed(Noise(physics=physics), ("head",))
+
+
+@pytest.mark.parametrize(("seconds", "grown"), [(5.0, False), (30.0, True)])
+def test_a_long_walk_has_a_hall_that_fits(seconds: float, grown: bool) -> None:
+    body, take = performed("walking", seconds)
+    noise = physical("clean", Physics(ConstellationSettings("hall")))
+    health = simulate_tracker(body, take, worn("head", "torso"), TrackerConfig(), noise, seed=SEED).health
+    assert (describe_grown_room(health) != "") == grown
+    extent_m = np.ptp(take.qpos[:, :2], axis=0)
+    if grown:
+        assert extent_m.max() > 11.0
+        assert health["room_emitters"] > 36
+        assert np.all(extent_m + 1.0 <= [health["room_length_m"], health["room_width_m"]])
+    assert min(health["head hears 3 emitters"], health["torso hears 3 emitters"]) > 0.95
 
 
 def test_a_bone_without_a_station_may_not_pass_the_ceiling_either() -> None:

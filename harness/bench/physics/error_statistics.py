@@ -5,23 +5,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.bench.physics.speed import MOUNTS, PHYSICAL
-from harness.body import retarget_to_own_body
+from harness.bench import common
+from harness.bench.physics.scenes import simulate_performer
+from harness.bench.physics.speed import PHYSICAL
 from harness.core.arrays import Floats, Ints
 from harness.core.number_format import count_noun
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
 from harness.measure import Episodes, ErrorSpectrum, find_excursions, find_gaps, measure_spectrum, pool_spectra
-from harness.mocap import synthetic
 from harness.report.physics.error_comparison import ERROR_QUANTILES, TrackerErrorStatistics
-from harness.simulate import Noise, TrackerConfig, Trajectory, noise_preset, sampling_times_s, simulate_readings
+from harness.simulate import Noise, TrackerConfig, noise_preset
 
 LIMIT_M, MERGE_S, SEGMENT_S = 0.01, 0.5, 10.0
 """Errors beyond this are excursions [m]; excursions less than this apart are one [s]; segment of a spectrum [s]."""
 _CLASSES = 10
 """Classes of quality."""
-_STATIONS, _SECONDS = 6, 60.0
-_TRACKER = TrackerConfig()
+_SECONDS = 60.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +121,7 @@ def compare_error_models(
     out = []
     models = {"physics": PHYSICAL, 'noise = "default"': noise_preset("default")}
     takes = f"{count_noun(len(seeds), 'take')} of built-in boxing of {_SECONDS:.0f} s"
-    source = f"{takes}, {_STATIONS} stations at {_TRACKER.rate_hz:g} Hz"
+    source = f"{takes}, {len(common.MOUNTS)} stations at {TrackerConfig().rate_hz:g} Hz"
     for done, (label, noise) in enumerate(models.items()):
         progress(f"errors of {label}", done, len(models))
         out.append(error_statistics(label, f"{source}.", _recordings(seeds, noise)))
@@ -131,15 +130,6 @@ def compare_error_models(
 
 
 def _recordings(seeds: Sequence[int], noise: Noise) -> Iterator[RecordedErrors]:
-    performers = synthetic.REFERENCE_PERFORMERS
     for seed in seeds:
-        performer = performers[seed % len(performers)]
-        clip = synthetic.generate("boxing", performer, 1, seed=seed, duration_s=_SECONDS)
-        body, take = retarget_to_own_body(clip)
-        trajectory, mounts = Trajectory(body, take), MOUNTS[:_STATIONS]
-        time_s = sampling_times_s(trajectory.duration_s, _TRACKER, _STATIONS)
-        found, true = (
-            simulate_readings(trajectory, mounts, _TRACKER, model, time_s, seed=seed, take=take.name)
-            for model in (noise, noise_preset("clean"))
-        )
-        yield RecordedErrors(np.asarray(time_s[:, 0]), found.position_m - true.position_m, found.quality)
+        found, true = simulate_performer("boxing", seed, _SECONDS, noise)
+        yield RecordedErrors(found.time_s[:, 0], found.position_m - true.position_m, found.quality)

@@ -6,15 +6,19 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from harness.body import DEFAULT_MOUNTS, build_body, tpose
+from harness.bench import common
+from harness.body import DEFAULT_MOUNTS, build_body, retarget_to_own_body, tpose
 from harness.core import rotations
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
+from harness.mocap import synthetic
 from harness.simulate import (
     WORLD_FROM_TRACKER,
+    FilterReadings,
     Noise,
+    SimulatedReadings,
     TrackerConfig,
     Trajectory,
     noise_preset,
@@ -48,8 +52,9 @@ BYSTANDER = Box(centre_m=(0.0, 0.7, 0.875), size_m=(0.5, 0.3, 1.75))
 BOARD = Box(centre_m=(0.2, 0.1, 1.9), size_m=(0.8, 0.8, 0.1))
 """A board that hangs above the free motion and shades a part of it, such as a lamp."""
 _TRACKER = TrackerConfig(rate_hz=RATE_HZ)
-_ORIGIN_M = np.array(_TRACKER.origin_m)
-MIDDLE_M = (0.0, 0.0, float(_ORIGIN_M[2]) - HEIGHT_M)
+ORIGIN_M = np.array(_TRACKER.origin_m)
+"""Origin of the tracker's frame in the world [m]."""
+MIDDLE_M = (0.0, 0.0, float(ORIGIN_M[2]) - HEIGHT_M)
 """The middle of the free motion in the tracker's frame [m]."""
 STATION = "station"
 
@@ -131,16 +136,29 @@ def track_free_station(
     covered_s: tuple[float, float] | None = None,
 ) -> StationErrors:
     """Errors of a free station. `make_source` makes equal sources; all emitters are covered in `covered_s` [s]."""
-    placed = PlacedRoom(physics.room, np.zeros(2), WORLD_FROM_TRACKER, _ORIGIN_M)
+    time_s, readings = measure_free_station(make_source(), seconds, physics, seed, covered_s=covered_s)
+    true = make_source().sample_motion(time_s)
+    turns = readings.tracker_from_station, true.tracker_from_station
+    return _errors(time_s, (readings.position_m, true.position_m), turns, readings.quality)
+
+
+def measure_free_station(
+    source: FreeMotionSource,
+    seconds: float,
+    physics: Physics,
+    seed: int,
+    *,
+    covered_s: tuple[float, float] | None = None,
+) -> tuple[Floats, FilterReadings]:
+    """Times (E,) of the records of a free station [s], and what they show; see `track_free_station`."""
+    placed = PlacedRoom(physics.room, np.zeros(2), WORLD_FROM_TRACKER, ORIGIN_M)
     shade = physics.room.shadow and bool(physics.room.furniture)
     constellation, sight = load_constellation(physics.constellation), LineOfSight(None, placed) if shade else None
-    tracker = PhysicalTracker(make_source(), physics, constellation, placed, sight, seed=seed, take=STATION)
+    tracker = PhysicalTracker(source, physics, constellation, placed, sight, seed=seed, take=STATION)
     if covered_s is not None:
         tracker.ranging = _CoveredEmitters(tracker.ranging, covered_s, tracker.schedule.slot_s)
     time_s = np.arange(int(seconds * RATE_HZ) + 1) / RATE_HZ
-    readings, true = tracker.measure_take(time_s[:, None]), make_source().sample_motion(time_s)
-    turns = readings.tracker_from_station, true.tracker_from_station
-    return _errors(time_s, (readings.position_m, true.position_m), turns, readings.quality)
+    return time_s, tracker.measure_take(time_s[:, None])
 
 
 def join_errors(parts: Sequence[StationErrors]) -> StationErrors:
@@ -154,8 +172,8 @@ class _CoveredEmitters:
     def __init__(self, ranging: RangeSource, covered_s: tuple[float, float], slot_s: float) -> None:
         self._ranging, self._covered_s, self._slot_s = ranging, covered_s, slot_s
 
-    def measure_ranges(self, first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
-        ranges = self._ranging.measure_ranges(first_slot, motion, qpos)
+    def measure_ranges(self, first_slot: int, emitter: Ints, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
+        ranges = self._ranging.measure_ranges(first_slot, emitter, motion, qpos)
         time_s = (first_slot + np.arange(len(ranges.emitter))) * self._slot_s
         covered = (time_s >= self._covered_s[0]) & (time_s < self._covered_s[1])
         return replace(ranges, range_m=np.where(covered[:, None, None], np.nan, ranges.range_m))
@@ -234,3 +252,19 @@ def scaled_position_m(place_m: Floats, scale: float, physics: Physics) -> Floats
 
     found: Floats = least_squares(residuals, place_m).x
     return found
+
+
+def simulate_performer(
+    behaviour: str, seed: int, seconds: float, noise: Noise
+) -> tuple[SimulatedReadings, SimulatedReadings]:
+    """Readings of the six stations on built-in motion, and the true ones, at the tracker's default rate."""
+    performers = synthetic.REFERENCE_PERFORMERS
+    clip = synthetic.generate(behaviour, performers[seed % len(performers)], 1, seed=seed, duration_s=seconds)
+    body, take = retarget_to_own_body(clip)
+    trajectory, tracker = Trajectory(body, take), TrackerConfig()
+    time_s = sampling_times_s(trajectory.duration_s, tracker, len(common.MOUNTS))
+    found, true = (
+        simulate_readings(trajectory, common.MOUNTS, tracker, model, time_s, seed=seed, take=take.name)
+        for model in (noise, noise_preset("clean"))
+    )
+    return found, true

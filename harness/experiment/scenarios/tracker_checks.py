@@ -1,10 +1,12 @@
 """What a scenario says of its trackers, held against the body, the device and the room."""
 
+import numpy as np
+
 from harness.body import locate_mounts
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import UnknownName
 from harness.experiment.scenarios.scenario import Scenario
-from harness.simulate.physics import check_emitters, load_constellation
+from harness.simulate.physics import fit_room, load_constellation
 from harness.stream import make_inputs
 from harness.stream.polhemus.codec import WireFormat
 
@@ -23,5 +25,5 @@ def check_trackers(scenario: Scenario) -> None:
         if slip.station not in scenario.stations:
             raise UnknownName("station", slip.station, scenario.stations)
     if noise.physics is not None:
-        emitters = load_constellation(noise.physics.constellation)
-        check_emitters(noise.physics.room, device.origin_m[2], emitters.number, emitters.position_m)
+        constellation = load_constellation(noise.physics.constellation)
+        fit_room(noise.physics.room, constellation, device.origin_m[2], np.zeros((0, 2)))

@@ -64,7 +64,7 @@ class CoverageContent:
     reach: str
     """Their range and cone, in words."""
     turn: str
-    """How long a turn of all emitters takes, in words."""
+    """How long a turn of the emitters that fire takes, in words."""
     emitter_m: Floats
     """(J, 3) positions in the tracker's frame [m]."""
     half_m: float

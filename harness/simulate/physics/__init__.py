@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from harness.simulate.physics.motion import TrackerMotion
     from harness.simulate.physics.physical_tracker import PhysicalTracker, RangeSource, lead_in_s
     from harness.simulate.physics.ranging import Ranges
-    from harness.simulate.physics.room import Box, PlacedRoom, check_emitters
+    from harness.simulate.physics.room import Box, PlacedRoom, fit_room
     from harness.simulate.physics.schedule import Schedule
     from harness.simulate.physics.settings import Physics
     from harness.simulate.physics.sound import Sound, speed_of_sound_m_s
@@ -51,9 +51,9 @@ __all__ = [
     "Schedule",
     "Sound",
     "TrackerMotion",
-    "check_emitters",
     "constellation_path",
     "emitter_coverage",
+    "fit_room",
     "grid_m",
     "lead_in_s",
     "load_constellation",

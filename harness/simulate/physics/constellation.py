@@ -13,6 +13,7 @@ from harness.core.ranges import Range, Text, check_fields
 from harness.core.seeds import generator
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.simulate.physics.emitters import MCF_SUFFIX, find_emitter_fault, read_mcf
+from harness.simulate.physics.further_bars import further_bars
 from harness.stream.polhemus.codec import Emitter
 
 _UNIT_TOLERANCE = 1e-9
@@ -23,7 +24,8 @@ class ConstellationSettings:
     """The emitters of a scenario."""
 
     name: Text = "cave"
-    """A shipped constellation: `cave` for performers on the spot, `hall` for performers who walk."""
+    """A shipped constellation: `cave` for performers on the spot, `hall` for performers who walk, or one of two real
+    rooms, `real_cave` and `real_walls` (`models/constellations/README.md`)."""
     file: Text = ""
     """Path of a file of `MCF` lines in the folder of the scenario's, or below it; it replaces `name`."""
     emitters: tuple[Emitter, ...] = ()
@@ -114,10 +116,6 @@ class Constellation:
         rows = zip(*(column.tolist() for column in columns), strict=True)
         return tuple(Emitter(number, tuple(at), tuple(normal), identity) for number, at, normal, identity in rows)
 
-    def lines(self) -> bytes:
-        """The reply to `MCF`."""
-        return b"".join(emitter.line() for emitter in self.emitters)
-
     def translate(self, offset_m: Floats) -> "Constellation":
         """The constellation moved by an offset (3,) in the tracker's axes [m]."""
         return replace(self, position_m=self.position_m + offset_m)
@@ -133,14 +131,17 @@ class Constellation:
         return replace(self, position_m=self.position_m + sd_m * np.array(error))
 
 
-def load_constellation(settings: ConstellationSettings) -> Constellation:
+def load_constellation(settings: ConstellationSettings, half_path_m: tuple[float, float] = (0.0, 0.0)) -> Constellation:
     """The constellation of a scenario, its origin in the tracker's.
 
-    Raises UnknownName for a name that is not shipped, and BadInput for a file that has not been read.
+    `hall` has further bars where the performer's root goes farther than usual from the middle of its path, along x and
+    y [m]. Raises UnknownName for a name that is not shipped, and BadInput for a file that has not been read.
     """
     if settings.file and not settings.emitters:
         raise BadInput(f"constellation.file = {settings.file!r} has not been read.", "Load the scenario from its file.")
     emitters = settings.emitters or read_mcf(constellation_path(settings.name))
+    if settings.name == "hall" and not settings.emitters:
+        emitters = (*emitters, *further_bars(half_path_m))
     return Constellation.of_emitters(emitters, float(np.deg2rad(settings.cone_deg)), settings.range_m)
 
 
@@ -153,8 +154,8 @@ def constellation_path(name: str) -> Path:
 
 
 def middle_of_path_m(root_m: Floats) -> Floats:
-    """(2,) world x and y of the middle of the rectangle that a path (N, 3) of the root covers [m]."""
-    out: Floats = 0.5 * (np.min(root_m[:, :2], axis=0) + np.max(root_m[:, :2], axis=0))
+    """(2,) world x and y of the middle of the rectangle that a path (N, 3) of the root covers [m], in whole cm."""
+    out: Floats = np.round(0.5 * (np.min(root_m[:, :2], axis=0) + np.max(root_m[:, :2], axis=0)), 2)
     return out
 
 

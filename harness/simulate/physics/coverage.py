@@ -157,7 +157,7 @@ def station_coverage(
     time_s = np.linspace(0.0, trajectory.duration_s, count)
     qpos = trajectory.qpos(time_s)
     stations = trajectory.station_motion(calibration, np.repeat(time_s[:, None], len(calibration.stations), axis=1))
-    centre_m = np.round(middle_of_path_m(motion.qpos), 2)
+    centre_m = middle_of_path_m(motion.qpos)
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
     centred, placed = place_room(room, constellation, centre_m, calibration)
     position_m = rotations.rotate(tracker_from_world, stations.position_m - calibration.tracker_origin_m)

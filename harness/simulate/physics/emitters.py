@@ -1,7 +1,8 @@
 """Emitters of a constellation: what they must fulfil, and files that list them as an IS-900 does (docs/is900.md 6.4).
 
-A file has `MCF` lines. A first line such as `# 9 emitters` says how many follow. It shows that the last line is there;
-an IS-900 does not send it. Without it the numbers have to be those from 1 on, so that any other line is missed.
+A file has `MCF` lines. A first line such as `# 9 emitters` says how many follow, and may go on with their source. It
+shows that the last line is there; an IS-900 does not send it. Without it the numbers have to be those from 1 on, so
+that any other line is missed.
 """
 
 import re
@@ -11,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.core.files import write_bytes
 from harness.core.input_file import MEGABYTE, read_input_file
 from harness.errors import BadFile, shorten
 from harness.stream.polhemus.codec import Emitter, parse_reply
@@ -32,7 +32,7 @@ _KIND = "emitters as `MCF` lists them"
 _LINE = "`31F`, number, position, normal and identity"
 _ADVICE = "docs/is900.md 6.4 describes the lines."
 _LONGEST_LINE = 200
-_COUNT = re.compile(rb"# ([0-9]{1,4}) emitters?")
+_COUNT = re.compile(rb"# ([0-9]{1,4}) emitters?(?: .*)?")
 
 
 class EmitterFault(NamedTuple):
@@ -130,12 +130,6 @@ def _find_lost(data: bytes, emitters: Sequence[Emitter], announced: int | None) 
     if not data.endswith((b"\n", b"\r")) and len(lines[-1]) < max(map(len, lines)):
         return "a last line that is shorter than others and has no end"
     return ""
-
-
-def write_mcf(path: Path, emitters: Sequence[Emitter]) -> None:
-    """Write their number, then emitters as the device sends them; positions have 4 decimals, normals 2."""
-    lines = (emitter.line() for emitter in emitters)
-    write_bytes(path, b"# %d emitters\r\n%b" % (len(emitters), b"".join(lines)))
 
 
 def _parse_line(line: bytes) -> Emitter | None:

@@ -7,7 +7,7 @@ the error at the slot's end.
 
 import numpy as np
 
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled
 from harness.core.compiled_rotations import Vector, quaternion_from_vector, quaternion_product, rotate
 from harness.simulate.physics.acquisition import integrate_path, level_attitude, solve_position
@@ -47,6 +47,7 @@ def filter_stations(
     model: FilterModel,
     state: FilterState,
     first_slot: int,
+    emitter: Ints,
     angle_rad: Floats,
     velocity_m_s: Floats,
     range_m: Floats,
@@ -84,9 +85,9 @@ def filter_stations(
             propagate_covariance(state.covariance[s], work.transition, TICKS_PER_SLOT * model.tick_s, work.product)
             add_slot_noise(model, state.covariance[s], inertia, work)
             if state.status[s, 0] == LOST:
-                acquire_slot(model, state, s, slot, range_m[f, s], work)
+                acquire_slot(model, state, s, slot, emitter[f], range_m[f, s], work)
             else:
-                update_slot(model, state, s, slot, range_m[f, s], work)
+                update_slot(model, state, s, slot, emitter[f], range_m[f, s], work)
             update_status(model, state, s, slot)
             decay_slot(model, state, s)
 
@@ -193,10 +194,12 @@ def state_at_arrival(
 
 
 @compiled
-def update_slot(model: FilterModel, state: FilterState, s: int, slot: int, range_m: Floats, work: Workspace) -> None:
+def update_slot(
+    model: FilterModel, state: FilterState, s: int, slot: int, emitter: int, range_m: Floats, work: Workspace
+) -> None:
     """Correct a station with the ranges (2,) of a slot, one after the other; NaN where nothing was heard."""
     ranging, covariance, motion, force = model.ranging, state.covariance[s], state.motion[s], work.force
-    emitter, vectors = slot % len(ranging.emitter_m), work.vectors
+    vectors = work.vectors
     error, slope, column, rest = vectors[0], vectors[1], vectors[2], vectors[3]
     error[:] = 0.0
     received, rejected = 0, 0
@@ -264,7 +267,9 @@ def apply_error_state(model: FilterModel, state: FilterState, s: int, error: Flo
 
 
 @compiled
-def acquire_slot(model: FilterModel, state: FilterState, s: int, slot: int, range_m: Floats, work: Workspace) -> None:
+def acquire_slot(
+    model: FilterModel, state: FilterState, s: int, slot: int, emitter: int, range_m: Floats, work: Workspace
+) -> None:
     """Collect the ranges (2,) of a slot for a station that is lost, and try a fix."""
     acquisition, force, slot_s = state.acquisition, work.force, TICKS_PER_SLOT * model.tick_s
     motion, path = state.motion[s], acquisition.path[s]
@@ -276,7 +281,7 @@ def acquire_slot(model: FilterModel, state: FilterState, s: int, slot: int, rang
         received += 1
         remaining_s = state_at_arrival(model, motion, work.angles, range_m[m], model.ranging.arm_m[m], at)
         row = acquisition.ranges[s, acquisition.range_count[s] % acquisition.ranges.shape[1]]
-        row[0], row[1], row[11] = path[6] - remaining_s, range_m[m], slot % len(model.ranging.emitter_m)
+        row[0], row[1], row[11] = path[6] - remaining_s, range_m[m], emitter
         for k in range(3):
             # The path at the arrival, back from the slot's end by the slot's mean force.
             row[2 + k] = path[k] - path[3 + k] * remaining_s + 0.5 * force[k] * remaining_s * remaining_s

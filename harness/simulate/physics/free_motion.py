@@ -58,6 +58,11 @@ class FreeMotionSource:
         spin = 2.0 * rotations.multiply(speed[..., 3:] / length, rotations.inverse(turn))
         return TrackerMotion(time_s, place[..., :3], turn, speed[..., :3], spin[..., 1:])
 
+    def performer_m(self, time_s: Floats) -> Floats:
+        """(F, 3) place of the first station at F times [s]."""
+        out: Floats = self._spline(time_s)[:, 0, :3]
+        return out
+
     def qpos(self, time_s: Floats) -> Floats | None:
         """None: no body is in the room."""
         return None

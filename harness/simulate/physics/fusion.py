@@ -45,8 +45,8 @@ class FusionFilter:
     ) -> None:
         """Emitters (J, 3) and their unit normals (J, 3) as the device knows them, in the tracker's frame [m]."""
         lever = np.array(inertial.lever_m)
-        slot_s, emitters = schedule.slot_s, schedule.emitters
-        window = min(max(3 * emitters, LEAST_WINDOW_SLOTS), LONGEST_WINDOW_SLOTS)
+        slot_s, turn = schedule.slot_s, schedule.turn_slots
+        window = min(max(3 * turn, LEAST_WINDOW_SLOTS), LONGEST_WINDOW_SLOTS)
         second = max(round(1.0 / slot_s), 1)
         self.stations = tuple(stations)
         ranging = RangingModel(
@@ -75,7 +75,7 @@ class FusionFilter:
             reject_share=fusion.reject_share,
             coast_slots=int(fusion.coast_s / slot_s),
             reject_slots=second,
-            confirmation_slots=min(max(emitters, CONFIRMATION_SLOTS), LONGEST_WINDOW_SLOTS),
+            confirmation_slots=min(max(turn, CONFIRMATION_SLOTS), LONGEST_WINDOW_SLOTS),
             window_s=(window + 0.5) * slot_s,
             best_sigma_m=fusion.quality_sigma_m,
         )
@@ -85,14 +85,21 @@ class FusionFilter:
             freeze_position(self.state, s)
 
     def filter_block(
-        self, first_slot: int, angle_rad: Floats, velocity_m_s: Floats, range_m: Floats, outputs: Outputs
+        self,
+        first_slot: int,
+        emitter: Ints,
+        angle_rad: Floats,
+        velocity_m_s: Floats,
+        range_m: Floats,
+        outputs: Outputs,
     ) -> None:
         """Advance over F slots, and fill those outputs whose ticks lie in them; the others stay as they are.
 
-        `angle_rad` and `velocity_m_s` (5 F, S, 3) are increments, see `strapdown`; `range_m` (F, S, 2) is NaN where
-        nothing was heard. A record shows what the filter knows at the beginning of its slot, and the inertia since.
+        `emitter` (F,) fires in each slot; `range_m` (F, S, 2) is NaN where it was not heard. `angle_rad` and
+        `velocity_m_s` (5 F, S, 3) are increments, see `strapdown`. A record shows what the filter knows at the
+        beginning of its slot, and the inertia since.
         """
-        slots, count = len(range_m), len(self.stations)
+        slots, count = len(emitter), len(self.stations)
         for name, array, shape in (
             ("angle_rad", angle_rad, (TICKS_PER_SLOT * slots, count, 3)),
             ("velocity_m_s", velocity_m_s, (TICKS_PER_SLOT * slots, count, 3)),
@@ -101,7 +108,7 @@ class FusionFilter:
             if array.shape != shape:
                 raise ShapeError("FusionFilter", name, array.shape, str(shape))
         angle, velocity, ranges = (np.ascontiguousarray(a, dtype=float) for a in (angle_rad, velocity_m_s, range_m))
-        filter_stations(self.model, self.state, first_slot, angle, velocity, ranges, outputs)
+        filter_stations(self.model, self.state, first_slot, emitter, angle, velocity, ranges, outputs)
 
 
 def empty_outputs(tick: Ints, fraction: Floats) -> Outputs:

@@ -55,6 +55,10 @@ class TrackerMotionSource(Protocol):
         """Motion at the ticks (T+1,) of the next block [s]. Blocks follow one another; the result may depend on all."""
         ...
 
+    def performer_m(self, time_s: Floats) -> Floats:
+        """(F, 3) place of the performer at F times [s]; it does not depend on which stations are worn."""
+        ...
+
     def qpos(self, time_s: Floats) -> Floats | None:
         """(F, 55) configurations of the body at F times [s]; None when no body is in the room."""
         ...

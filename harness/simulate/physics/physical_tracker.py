@@ -11,7 +11,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats
+from harness.core.arrays import Bools, Floats, Ints
 from harness.core.stream_health import ENOUGH_EMITTERS
 from harness.simulate.physics.constellation import Constellation
 from harness.simulate.physics.fusion import FusionFilter, empty_outputs
@@ -20,7 +20,7 @@ from harness.simulate.physics.line_of_sight import LineOfSight
 from harness.simulate.physics.motion import TrackerMotion, TrackerMotionSource
 from harness.simulate.physics.ranging import Ranges, Ranging
 from harness.simulate.physics.room import PlacedRoom
-from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
+from harness.simulate.physics.schedule import TICKS_PER_SLOT, FiringOrder, Schedule
 from harness.simulate.physics.settings import Physics
 from harness.simulate.readings import FilterReadings
 
@@ -28,7 +28,7 @@ from harness.simulate.readings import FilterReadings
 class RangeSource(Protocol):
     """What measures the ranges of block after block of slots; see `Ranging`."""
 
-    def measure_ranges(self, first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges: ...
+    def measure_ranges(self, first_slot: int, emitter: Ints, motion: TrackerMotion, qpos: Floats | None) -> Ranges: ...
 
 
 class PhysicalTracker:
@@ -71,20 +71,24 @@ class PhysicalTracker:
         )
         self._source, self._lever_m = source, np.array(inertial.lever_m)
         self._first_slot = -lead_in_slots(physics)
-        self._with_body = sight is not None
+        self._emitter_m, self._with_body = constellation.position_m, sight is not None
 
     def measure_take(self, time_s: Floats) -> FilterReadings:
         """Readings at the times (E, S) of a take, ascending for each station and not before 0 [s]."""
-        tick_hz = self.schedule.tick_hz
-        tick = np.floor(time_s * tick_hz).astype(np.int64)
-        outputs = empty_outputs(tick, time_s * tick_hz - tick)
-        statistics = _RangeStatistics(self.schedule.emitters, time_s.shape[1])
+        tick, fraction = self.schedule.ticks_at(time_s)
+        outputs = empty_outputs(tick, fraction)
+        statistics = _RangeStatistics(self.schedule, time_s.shape[1])
+        firing = FiringOrder(self._emitter_m, self.schedule.turn_slots, self._first_slot)
         end = int(tick.max()) // TICKS_PER_SLOT + 1
         for first in range(self._first_slot, end, self.block_slots):
-            motion, qpos = self._true_motion(first, min(self.block_slots, end - first))
-            ranges = self.ranging.measure_ranges(first, motion, qpos)
+            ticks_s = self.schedule.ticks_s(first, min(self.block_slots, end - first))
+            slots_s = ticks_s[:-1:TICKS_PER_SLOT]
+            motion = self._source.sample_motion(ticks_s)
+            emitter = firing.next_emitters(self._source.performer_m(slots_s))
+            qpos = self._source.qpos(slots_s) if self._with_body else None
+            ranges = self.ranging.measure_ranges(first, emitter, motion, qpos)
             angle_rad, velocity_m_s = self.unit.measure_increments(*true_increments(motion, self._lever_m))
-            self.fusion.filter_block(first, angle_rad, velocity_m_s, ranges.range_m, outputs)
+            self.fusion.filter_block(first, emitter, angle_rad, velocity_m_s, ranges.range_m, outputs)
             statistics.add(first, ranges)
         quality, _, received, rejected = np.moveaxis(outputs.report, -1, 0)
         position_m, turned = (
@@ -97,12 +101,6 @@ class PhysicalTracker:
             *(outputs.velocity_m_s, outputs.turn_rad_s, position_m[1:], turned[1:]),
             *statistics.shares(),
         )
-
-    def _true_motion(self, first: int, slots: int) -> tuple[TrackerMotion, Floats | None]:
-        """True motion at the ticks of a block, and the body's configurations (F, 55) at its slots."""
-        ticks_s = self.schedule.ticks_s(first, slots)
-        motion = self._source.sample_motion(ticks_s)
-        return motion, self._source.qpos(ticks_s[:-1:TICKS_PER_SLOT]) if self._with_body else None
 
 
 def lead_in_slots(physics: Physics) -> int:
@@ -118,18 +116,17 @@ def lead_in_s(physics: Physics) -> float:
 class _RangeStatistics:
     """Counts how many emitters each station hears directly, and how many ranges are echoes, from time 0 on."""
 
-    def __init__(self, emitters: int, stations: int) -> None:
-        self._last = np.full((stations, emitters), -(2**62))
+    def __init__(self, schedule: Schedule, stations: int) -> None:
+        self._last, self._turn = np.full((stations, schedule.emitters), -(2**62)), schedule.turn_slots
         self._enough, self._slots = np.zeros(stations), 0
         self._ranges, self._echoes = np.zeros(stations), np.zeros(stations)
 
     def add(self, first_slot: int, ranges: Ranges) -> None:
         heard: Bools = np.any(ranges.direct, axis=2)
-        emitters = self._last.shape[1]
         for k, emitter in enumerate(ranges.emitter.tolist()):
             self._last[heard[k], emitter] = first_slot + k
             if first_slot + k >= 0:
-                self._enough += np.sum(self._last > first_slot + k - emitters, axis=1) >= ENOUGH_EMITTERS
+                self._enough += np.sum(self._last > first_slot + k - self._turn, axis=1) >= ENOUGH_EMITTERS
                 self._slots += 1
         taken = slice(max(-first_slot, 0), None)
         self._ranges += np.sum(~np.isnan(ranges.range_m[taken]), axis=(0, 2))

@@ -111,27 +111,28 @@ class Ranging:
         self._noise = [generator(seed, "physics", take, "range noise", station) for station in stations]
         self._chance = [generator(seed, "physics", take, "range faults", station) for station in stations]
         self._air_m_s = np.full((schedule.emitters, len(stations)), np.nan)
+        self._air_slot = np.zeros(schedule.emitters, dtype=np.int64)
 
-    def measure_ranges(self, first_slot: int, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
-        """The ranges of the next block of F slots.
+    def measure_ranges(self, first_slot: int, emitter: Ints, motion: TrackerMotion, qpos: Floats | None) -> Ranges:
+        """The ranges of the next block of F slots, in which emitters (F,) fire.
 
         `motion` covers the block's ticks. `qpos` (F, 55) is the body's configuration at the beginning of each slot, for
         `sight`; None if no body is in the room.
         """
         points = [motion.points(np.array(offset_m)) for offset_m in self._sound.microphones_m]
         position_m, velocity_m_s = (np.ascontiguousarray(np.stack(part, axis=2)) for part in zip(*points, strict=True))
-        slots = (len(position_m) - 1) // TICKS_PER_SLOT
+        slots = len(emitter)
         begins = slice(0, slots * TICKS_PER_SLOT, TICKS_PER_SLOT)
         facing = rotations.rotate(motion.tracker_from_station[begins], np.array([0.0, 0.0, 1.0]))
-        emitter = self._schedule.emitter_of(first_slot, slots)
         normals = np.stack([rng.standard_normal((slots, MICROPHONES + 1)) for rng in self._noise], axis=1)
         uniforms = np.stack([rng.random((slots, MICROPHONES, 2)) for rng in self._chance], axis=1)
-        turn = self._schedule.emitters * self._schedule.slot_s
         _air_speeds(
             self._air_m_s,
+            self._air_slot,
+            first_slot,
             emitter,
             normals[..., MICROPHONES],
-            math.exp(-turn / self._sound.air_correlation_s),
+            self._schedule.slot_s / self._sound.air_correlation_s,
             self._sound.air_speed_sd_m_s,
             air := np.empty((slots, len(self._noise))),
         )
@@ -188,11 +189,25 @@ class Ranging:
 
 
 @compiled
-def _air_speeds(state: Floats, emitter: Ints, normals: Floats, correlation: float, sd: float, out: Floats) -> None:
-    """Speed of the air along each path (F, S): a Gauss-Markov step at each firing of the path's emitter."""
-    fresh = sd * math.sqrt(1.0 - correlation * correlation)
+def _air_speeds(
+    state: Floats,
+    state_slot: Ints,
+    first_slot: int,
+    emitter: Ints,
+    normals: Floats,
+    decay: float,
+    sd: float,
+    out: Floats,
+) -> None:
+    """Speed of the air along each path (F, S): a Gauss-Markov step at each firing of the path's emitter.
+
+    `state` (J, S) was reached in `state_slot` (J,). `decay` is the duration of a slot in correlation times.
+    """
     for slot in range(len(emitter)):
         j = emitter[slot]
+        correlation = math.exp(-decay * (first_slot + slot - state_slot[j]))
+        fresh = sd * math.sqrt(1.0 - correlation * correlation)
+        state_slot[j] = first_slot + slot
         for s in range(state.shape[1]):
             if np.isnan(state[j, s]):
                 state[j, s] = sd * normals[slot, s]

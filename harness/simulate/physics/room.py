@@ -1,16 +1,21 @@
 """The room: floor, walls and ceiling that reflect sound, and furniture that blocks it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Floats, Ints, freeze
+from harness.core.arrays import Floats, freeze
 from harness.core.calibration import Calibration
 from harness.core.ranges import CheckedFields, Range, check_fields
 from harness.errors import BadInput
 from harness.simulate.physics.constellation import Constellation
+
+SMALLEST_M = 12.0, 12.0, 2.6
+"""Length, width and height of a room that leaves them open, at least [m] [choice]."""
+_WALL_GAP_M, _CEILING_GAP_M = 0.5, 0.1
+"""Distance of its walls and its ceiling from what they hold, at least [m] [choice]."""
 
 
 @dataclass(frozen=True)
@@ -27,10 +32,11 @@ class Box(CheckedFields):
 class Room:
     """A rectangular room, whose middle lies under the middle of the constellation; its floor is the world's z = 0."""
 
-    size_m: Annotated[tuple[float, float], Range(1.0, 200.0)] = (12.0, 12.0)
-    """Length along the world's x and y [m] [choice]."""
-    height_m: Annotated[float, Range(1.5, 50.0)] = 2.6
-    """Height of the ceiling [m]: 0.1 m above the emitters of the shipped constellations [choice]."""
+    size_m: Annotated[tuple[float, float] | None, Range(1.0, 200.0)] = None
+    """Length along the world's x and y [m]; by default that of `SMALLEST_M`, or more where emitters or motion need it.
+    """
+    height_m: Annotated[float | None, Range(1.5, 50.0)] = None
+    """Height of the ceiling [m]; by default 0.1 m above the highest emitter, and that of `SMALLEST_M` at least."""
     reflection: Annotated[float, Range(0.0, 1.0)] = 0.7
     """Share of the amplitude that floor, walls and ceiling reflect [choice]."""
     shadow: bool = True
@@ -42,11 +48,17 @@ class Room:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        low, high = (-self.size_m[0] / 2, -self.size_m[1] / 2, 0.0), (*(s / 2 for s in self.size_m), self.height_m)
+        length, width, height = self.extent_m
+        low, high = (-length / 2, -width / 2, 0.0), (length / 2, width / 2, height)
         for number, box in enumerate(self.furniture, start=1):
             for centre, size, least, most in zip(box.centre_m, box.size_m, low, high, strict=True):
                 if centre - size / 2 < least - 1e-9 or centre + size / 2 > most + 1e-9:
                     raise BadInput(f"Box {number} of room.furniture passes a wall.", "Make it smaller, or move it.")
+
+    @property
+    def extent_m(self) -> tuple[float, float, float]:
+        """Length along x and y and height [m]; the least one where it is left open."""
+        return *(self.size_m or SMALLEST_M[:2]), self.height_m or SMALLEST_M[2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,16 +76,11 @@ class PlacedRoom:
     def __post_init__(self) -> None:
         freeze(self, centre_m=(2,), world_from_tracker=(4,), origin_m=(3,))
 
-    def to_world(self, position_m: Floats) -> Floats:
-        """Points (..., 3) of the tracker's frame in world axes [m]."""
-        out: Floats = rotations.rotate(self.world_from_tracker, position_m) + self.origin_m
-        return out
-
     def planes(self) -> Floats:
         """(6, 4) floor, ceiling and walls in the tracker's frame: outward unit normal and distance along it [m]."""
-        (x, y), (length, width) = self.centre_m, self.room.size_m
+        (x, y), (length, width, height) = self.centre_m, self.room.extent_m
         normal = np.array([[0, 0, -1], [0, 0, 1], [-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0]], dtype=float)
-        distance_m = np.array([0.0, self.room.height_m, length / 2 - x, length / 2 + x, width / 2 - y, width / 2 + y])
+        distance_m = np.array([0.0, height, length / 2 - x, length / 2 + x, width / 2 - y, width / 2 + y])
         own = rotations.rotate(rotations.inverse(self.world_from_tracker), normal)
         return np.concatenate([own, (distance_m - np.sum(normal * self.origin_m, axis=1))[:, None]], axis=1)
 
@@ -94,8 +101,9 @@ def check_room(room: Room, centre_m: Floats, name: str, position_m: Floats) -> N
 
     `name` is what moves on that path, for the message; `centre_m` is the middle of the room, world x and y.
     """
-    low = np.array([*(np.asarray(centre_m) - np.array(room.size_m) / 2), -np.inf])
-    high = np.array([*(np.asarray(centre_m) + np.array(room.size_m) / 2), room.height_m])
+    (x, y), (length, width, height) = centre_m, room.extent_m
+    low = np.array([x - length / 2, y - width / 2, -np.inf])
+    high = np.array([x + length / 2, y + width / 2, height])
     outside = (position_m < low) | (position_m > high)
     if not np.any(outside):
         return
@@ -109,17 +117,17 @@ def check_room(room: Room, centre_m: Floats, name: str, position_m: Floats) -> N
     )
 
 
-def check_emitters(room: Room, origin_height_m: float, number: Ints, position_m: Floats) -> None:
-    """BadInput if one of J emitters hangs outside the walls or above the ceiling.
+def fit_room(room: Room, constellation: Constellation, origin_height_m: float, points_m: Floats) -> Room:
+    """The room with the sizes that it leaves open: they hold J emitters and points (N, 2), from its middle [m].
 
-    `position_m` (J, 3) are their places by their numbers (J,), in a tracker's frame whose origin is `origin_height_m`
-    above the middle of the floor [m].
+    The constellation is in a tracker's frame whose origin is `origin_height_m` above the middle of the floor [m]. Walls
+    are whole metres apart. BadInput if an emitter hangs outside the walls or above the ceiling.
     """
-    for name, (x, y, z) in zip(number.tolist(), position_m.tolist(), strict=True):
-        height_m = origin_height_m - z  # the frame's z points down
-        if abs(x) > room.size_m[0] / 2 or abs(y) > room.size_m[1] / 2:
-            found = f"Emitter {name} hangs outside the walls, at ({x:.2f}, {y:.2f}) m from the middle of the room."
-            raise BadInput(found, "Make physics.room.size_m larger.")
-        if height_m > room.height_m:
-            found = f"Emitter {name} hangs at {height_m:.2f} m, above the ceiling at {room.height_m:.2f} m."
-            raise BadInput(found, "Make physics.room.height_m larger, or tracker.origin_m lower.")
+    hanging_m = constellation.position_m * [1.0, 1.0, -1.0] + [0.0, 0.0, origin_height_m]  # the frame's z points down
+    reach_m = np.max(np.abs(np.concatenate([points_m, hanging_m[:, :2]])), axis=0)
+    length, width = np.maximum(SMALLEST_M[:2], np.ceil(2.0 * (reach_m + _WALL_GAP_M))).tolist()
+    height = max(SMALLEST_M[2], float(np.max(hanging_m[:, 2])) + _CEILING_GAP_M)
+    out = replace(room, size_m=room.size_m or (length, width), height_m=room.height_m or height)
+    for number, place_m in zip(constellation.number.tolist(), hanging_m, strict=True):
+        check_room(out, np.zeros(2), f"emitter {number}", place_m[None])
+    return out

@@ -209,6 +209,11 @@ class BodyMotionSource:
         self._displacement.apply(motion, force_m_s2)
         return motion
 
+    def performer_m(self, time_s: Floats) -> Floats:
+        """(F, 3) place of the body's root at F times [s]."""
+        root_m = self._trajectory.qpos(time_s)[:, :3]
+        return rotations.rotate(self._chain.tracker_from_world, root_m - self._chain.origin_m)
+
     def qpos(self, time_s: Floats) -> Floats:
         """(F, 55) configurations at F times [s]."""
         return self._trajectory.qpos(time_s)

@@ -15,6 +15,7 @@ from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.sound import Sound, level_db, noise_factor, speed_of_sound_m_s
 from harness.simulate.physics.tracking_status import TRACKING
 from harness.simulate.readings import GRAVITY_M_S2
+from tests.simulate.physics.rooms import emitters_in_turn
 
 TICK_HZ = 400.0
 EMITTER_M: Floats = np.array([[x, y, -2.5] for x in (-1.2, 0.0, 1.2) for y in (-1.2, 0.1, 1.2)])
@@ -152,7 +153,9 @@ def run(fusion_filter: FusionFilter, *measured: FreeStation, block: int = 10**6,
     outputs = records_every(ticks, len(heard), len(measured))
     for first in range(0, len(heard), block):
         span = slice(first * TICKS_PER_SLOT, (first + block) * TICKS_PER_SLOT)
-        fusion_filter.filter_block(first, angle[span], gain[span], heard[first : first + block], outputs)
+        part = heard[first : first + block]
+        emitter = emitters_in_turn(first, len(part), len(EMITTER_M))
+        fusion_filter.filter_block(first, emitter, angle[span], gain[span], part, outputs)
     return outputs
 
 

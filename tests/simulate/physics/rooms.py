@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from harness.body import DEFAULT_MOUNTS, Body
 from harness.core import rotations
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.core.motion import BodyMotion
 from harness.simulate.link import TrackerConfig
 from harness.simulate.physics.constellation import Constellation
@@ -17,6 +18,7 @@ from harness.simulate.physics.schedule import TICKS_PER_SLOT
 from harness.simulate.simulation import WORLD_FROM_TRACKER, exact_calibration
 from harness.simulate.trajectory import Trajectory
 from harness.stream.polhemus import DEFAULT_EMITTERS
+from harness.stream.polhemus.codec import Emitter
 
 TICK_HZ = 400.0
 ORIGIN_M = np.array(TrackerConfig().origin_m)
@@ -35,9 +37,22 @@ def emitters_at(*position_m: Sequence[float], cone_deg: float = 70.0) -> Constel
     )
 
 
+def write_mcf(folder: Path, emitters: Sequence[Emitter]) -> Path:
+    """A file of the lines that the device sends."""
+    path = folder / "room.mcf"
+    path.write_bytes(b"".join(emitter.line() for emitter in emitters))
+    return path
+
+
 def grid() -> Constellation:
     """The emulator's nine emitters, which face down 2.5 m above the floor."""
     return emitters_at(*(emitter.position_m for emitter in DEFAULT_EMITTERS))
+
+
+def emitters_in_turn(first_slot: int, slots: int, emitters: int = 9) -> Ints:
+    """(F,) the emitter of each slot, one after another."""
+    out: Ints = np.arange(first_slot, first_slot + slots) % emitters
+    return out
 
 
 def placed(room: Room | None = None, centre_m: Floats = ORIGIN_M[:2]) -> PlacedRoom:

@@ -20,6 +20,7 @@ from tests.simulate.physics.free_station import (
     noisy,
     records_every,
 )
+from tests.simulate.physics.rooms import emitters_in_turn
 
 SLOTS = 40
 
@@ -29,7 +30,7 @@ def searching(station: FreeStation, slots: int = SLOTS) -> FusionFilter:
     fusion_filter = new_filter(fusion=Fusion(), inertial=exact_inertial())
     fusion_filter.model = fusion_filter.model._replace(window_s=0.0)
     measured = station.angle_rad[: 5 * slots, None], station.gain_m_s[: 5 * slots, None], station.range_m[:slots, None]
-    fusion_filter.filter_block(0, *measured, records_every(5, 0))
+    fusion_filter.filter_block(0, emitters_in_turn(0, slots), *measured, records_every(5, 0))
     return fusion_filter
 
 

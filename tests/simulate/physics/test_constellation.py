@@ -13,12 +13,14 @@ from harness.simulate.physics.constellation import (
     Constellation,
     ConstellationSettings,
     check_reach,
+    constellation_path,
     load_constellation,
     middle_of_path_m,
 )
-from harness.simulate.physics.emitters import read_mcf, write_mcf
+from harness.simulate.physics.emitters import read_mcf
 from harness.stream.polhemus import DEFAULT_EMITTERS
 from harness.stream.polhemus.codec import Emitter
+from tests.simulate.physics.rooms import write_mcf
 
 DOWN = (0.0, 0.0, 1.0)
 
@@ -46,16 +48,26 @@ def test_hall_is_twelve_bars_of_three_that_face_down() -> None:
     np.testing.assert_allclose(hall.position_m.mean(axis=0), 0.0, atol=1e-9)
 
 
+@pytest.mark.parametrize(("name", "heights_m"), [("real_cave", (2.44, 2.59)), ("real_walls", (0.07, 2.98))])
+def test_the_bars_of_real_rooms_are_the_maker_s_and_face_the_performer(
+    name: str, heights_m: tuple[float, float]
+) -> None:
+    """Bars of three emitters, 0.91 m apart (docs/is900.md 13.1)."""
+    room = load_constellation(ConstellationSettings(name=name))
+    height_m = 2.5 - room.position_m[:, 2]
+    assert heights_m[0] < height_m.min() < height_m.max() < heights_m[1]
+    steps_m = np.linalg.norm(np.diff(room.position_m.reshape(6, 3, 3), axis=1), axis=-1)
+    np.testing.assert_allclose(steps_m, 0.91, atol=0.02)
+    towards = np.array([0.0, 0.0, 1.0]) - room.position_m
+    assert np.all(np.sum(towards * room.normal, axis=1) > 0.3)
+
+
 @pytest.mark.parametrize("name", ["cave", "hall"])
 def test_the_lines_of_a_shipped_constellation_are_its_file(name: str, tmp_path: Path) -> None:
-    constellation = load_constellation(ConstellationSettings(name=name))
-    path = tmp_path / "x.mcf"
-    path.write_bytes(constellation.lines())
-    assert read_mcf(path) == constellation.emitters
-    write_mcf(path, constellation.emitters)
-    count = len(constellation.emitters)
-    assert path.read_bytes() == b"# %d emitters\r\n" % count + constellation.lines()
-    assert read_mcf(path) == constellation.emitters
+    emitters = load_constellation(ConstellationSettings(name=name)).emitters
+    path = write_mcf(tmp_path, emitters)
+    assert read_mcf(path) == emitters
+    assert constellation_path(name).read_bytes() == b"# %d emitters\r\n" % len(emitters) + path.read_bytes()
 
 
 def test_an_unknown_name_is_refused() -> None:
@@ -137,16 +149,15 @@ def test_each_emitter_has_its_own_survey_error() -> None:
 
 def test_a_scenario_names_a_file_in_its_folder(tmp_path: Path) -> None:
     (tmp_path / "scenario" / "rooms").mkdir(parents=True)
-    inside, outside = tmp_path / "scenario" / "rooms" / "a.mcf", tmp_path / "b.mcf"
-    write_mcf(inside, three())
-    write_mcf(outside, three())
-    named = ConstellationSettings(name="no such name", file="rooms/a.mcf")
+    outside = write_mcf(tmp_path, three())
+    write_mcf(tmp_path / "scenario" / "rooms", three())
+    named = ConstellationSettings(name="no such name", file="rooms/room.mcf")
     with pytest.raises(BadInput, match="has not been read"):
         load_constellation(named)
     read = named.with_file_read(tmp_path / "scenario")
     assert load_constellation(read).emitters == tuple(three())
     (tmp_path / "scenario" / "link.mcf").symlink_to(outside)
-    for file in ("../b.mcf", str(outside), "link.mcf"):
+    for file in ("../room.mcf", str(outside), "link.mcf"):
         with pytest.raises(BadFile, match="outside the scenario's folder"):
             ConstellationSettings(file=file).with_file_read(tmp_path / "scenario")
     with pytest.raises(BadFile, match="no such file"):

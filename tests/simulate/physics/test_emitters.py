@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from harness.core.package_data import data_folder
 from harness.errors import BadFile
-from harness.simulate.physics.emitters import MAX_MCF_BYTES, read_mcf, write_mcf
+from harness.simulate.physics.emitters import MAX_MCF_BYTES, read_mcf
 from harness.stream.polhemus.codec import Emitter
+from tests.simulate.physics.rooms import write_mcf
 
 LINE = b"31F      1   -0.9144   -0.6096    0.0000   0.00   0.00   1.00   5001\r\n"
 OTHERS = [
@@ -40,15 +41,13 @@ def test_emitters_are_read_as_they_were_written(
         x, y, z = (vector / np.linalg.norm(vector)).tolist()
         apart = (place[0] + 101.0 * number, place[1], place[2])
         emitters.append(Emitter(number, apart, (x, y, z), 5000 + number))
-    path = tmp_path_factory.mktemp("mcf") / "a.mcf"
-    write_mcf(path, emitters)
+    path = write_mcf(tmp_path_factory.mktemp("mcf"), emitters)
     found = read_mcf(path)
     assert [(e.number, e.identity) for e in found] == [(e.number, e.identity) for e in emitters]
     np.testing.assert_allclose([e.position_m for e in found], [e.position_m for e in emitters], atol=0.5001e-4)
     np.testing.assert_allclose([e.normal for e in found], [e.normal for e in emitters], atol=0.5001e-2)
     written = path.read_bytes()
-    write_mcf(path, found)
-    assert path.read_bytes() == written
+    assert write_mcf(path.parent, found).read_bytes() == written
 
 
 @pytest.mark.parametrize("end", [b"\n", b"\r", b"\r\n", b"\r\n\r\n", b" \r\n"])
@@ -118,10 +117,12 @@ def test_a_last_line_that_was_cut_is_noticed(tmp_path: Path, head: bytes) -> Non
     assert read_mcf(write(tmp_path, whole[:-2]))[-1].identity == 5004  # the line end alone
 
 
-@pytest.mark.parametrize(("name", "count"), [("cave", 9), ("hall", 36)])
+@pytest.mark.parametrize(("name", "count"), [("cave", 9), ("hall", 36), ("real_cave", 18), ("real_walls", 18)])
 def test_shipped_constellations_announce_their_number(name: str, count: int) -> None:
     path = data_folder("models") / "constellations" / f"{name}.mcf"
-    assert path.read_bytes().startswith(b"# %d emitters\r\n" % count)
+    first = path.read_bytes().split(b"\r\n")[0]
+    assert first.startswith(b"# %d emitters" % count)
+    assert (b" github.com/vrui-vr/vrui, etc/VRDevices.cfg" in first) == name.startswith("real")
     assert len(read_mcf(path)) == count
 
 

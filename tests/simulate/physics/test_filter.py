@@ -28,6 +28,7 @@ from tests.simulate.physics.free_station import (
     true_error,
 )
 from tests.simulate.physics.reference_filter import ReferenceFilter
+from tests.simulate.physics.rooms import emitters_in_turn
 
 RUNS = 50
 
@@ -60,7 +61,12 @@ def test_equals_a_plain_filter_written_apart(fusion: Fusion, rng: np.random.Gene
         span = slice(5 * slot, 5 * slot + 5)
         outputs = records_every(5, 0)
         kernel.filter_block(
-            slot, station.angle_rad[span, None], station.gain_m_s[span, None], ranges[None, None], outputs
+            slot,
+            emitters_in_turn(slot, 1),
+            station.angle_rad[span, None],
+            station.gain_m_s[span, None],
+            ranges[None, None],
+            outputs,
         )
         plain.slot(station.angle_rad[span], station.gain_m_s[span], ranges, slot % 9)
         motion = kernel.state.motion[0, -1]

@@ -12,6 +12,8 @@ from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.filter_state import Outputs
 from harness.simulate.physics.fusion import FusionFilter
 from harness.simulate.physics.inertial import Inertial
+from harness.simulate.physics.schedule import NEAR_EMITTERS, Schedule
+from harness.simulate.physics.sound import Sound
 from tests.simulate.physics.free_station import (
     EMITTER_M,
     EXACT,
@@ -26,6 +28,7 @@ from tests.simulate.physics.free_station import (
     run,
     start,
 )
+from tests.simulate.physics.rooms import emitters_in_turn
 
 SLOTS_PER_S = 80
 
@@ -94,7 +97,12 @@ def test_records_between_ticks_follow_the_motion() -> None:
     start(fusion_filter, station, np.zeros(15))
     outputs = records_every(7, len(station.range_m), fraction=0.5)
     fusion_filter.filter_block(
-        0, station.angle_rad[:, None], station.gain_m_s[:, None], station.range_m[:, None], outputs
+        0,
+        emitters_in_turn(0, len(station.range_m)),
+        station.angle_rad[:, None],
+        station.gain_m_s[:, None],
+        station.range_m[:, None],
+        outputs,
     )
     k = outputs.tick[1:, 0]
     between = 0.5 * (station.position_m[k] + station.position_m[k + 1])
@@ -179,11 +187,29 @@ def test_the_spread_at_rest_is_the_published_one() -> None:
     assert 0.001 < np.median(spreads) < 0.002
 
 
+def test_windows_do_not_grow_with_emitters_that_do_not_fire() -> None:
+    models = [
+        FusionFilter(
+            *(Fusion(), Sound(), Inertial(), np.zeros((count, 3)), np.tile([0.0, 0.0, 1.0], (count, 1))),
+            Schedule(TICK_HZ, count),
+            ["a"],
+        ).model
+        for count in (NEAR_EMITTERS, 4 * NEAR_EMITTERS)
+    ]
+    assert models[0].window_s == models[1].window_s
+    assert models[0].confirmation_slots == models[1].confirmation_slots
+
+
 def test_wrong_shapes_are_refused() -> None:
     station = free_station(1.0, 0)
     with pytest.raises(ShapeError, match="range_m"):
         new_filter().filter_block(
-            0, station.angle_rad[:, None], station.gain_m_s[:, None], station.range_m, records_every(5, 80)
+            0,
+            emitters_in_turn(0, 80),
+            station.angle_rad[:, None],
+            station.gain_m_s[:, None],
+            station.range_m,
+            records_every(5, 80),
         )
 
 

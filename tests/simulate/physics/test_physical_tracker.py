@@ -8,6 +8,7 @@ import pytest
 from harness.simulate.components.soft_tissue import skin_below
 from harness.simulate.noise import Noise
 from harness.simulate.physical_readings import place_constellation
+from harness.simulate.physics.constellation import ConstellationSettings
 from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.line_of_sight import LineOfSight
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s, lead_in_slots
@@ -40,11 +41,11 @@ def test_the_lead_in_is_a_whole_number_of_slots() -> None:
     assert lead_in_s(physics) == pytest.approx(34 * 5 / 333.3)
 
 
-def make_tracker() -> PhysicalTracker:
-    """The chest and left ankle of the boxer, who boxes for 3 s below `cave`."""
+def make_tracker(name: str = "cave") -> PhysicalTracker:
+    """The chest and left ankle of the boxer, who boxes for 3 s below a constellation."""
     (body, take), mounts = performed(), worn("left_ankle", "torso")
     calibration = exact_calibration(body, mounts, TRACKER)
-    physics, trajectory = Physics(), Trajectory(body, take)
+    physics, trajectory = Physics(ConstellationSettings(name)), Trajectory(body, take)
     constellation, placed = place_constellation(trajectory, calibration, physics)
     whole = trajectory.with_lead_in(lead_in_s(physics)).with_lead_out(0.5)
     skin = skin_below(body.skeleton, mounts, calibration)
@@ -53,13 +54,14 @@ def make_tracker() -> PhysicalTracker:
     return PhysicalTracker(source, physics, constellation, placed, LineOfSight(body, placed), seed=1, take="t")
 
 
-def test_health_counts_what_the_ranges_say(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", ["cave", "hall"])
+def test_health_counts_what_the_ranges_say(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Counted again by hand: three emitters heard within the last turn, and the share of echoes, from time 0 on."""
-    tracker, seen = make_tracker(), dict[int, tuple[Ranges, int]]()
+    tracker, seen = make_tracker(name), dict[int, tuple[Ranges, int]]()
     measure = tracker.ranging.measure_ranges
 
-    def watched(first: int, motion: object, qpos: object) -> Ranges:
-        found = measure(first, motion, qpos)  # type: ignore[arg-type]
+    def watched(first: int, *block: object) -> Ranges:
+        found = measure(first, *block)  # type: ignore[arg-type]
         seen.update({first + k: (found, k) for k in range(len(found.emitter))})
         return found
 
@@ -85,3 +87,14 @@ def test_a_part_of_the_records_has_their_values() -> None:
     np.testing.assert_array_equal(some.ranges_received, whole.ranges_received[7::13])
     assert whole.ranges_received.max() == 12
     assert (whole.ranges_rejected <= whole.ranges_received).all()
+
+
+@pytest.mark.parametrize("rate_hz", [120, 200])
+def test_readings_at_common_times_do_not_depend_on_the_rate(rate_hz: int) -> None:
+    """Steps of 1/120 s and of 1/40 s meet at times whose last bits differ, also at the edges of slots."""
+    time_s, step = np.arange(100) * (1.0 / 40.0), rate_hz // 40
+    faster_s = np.arange(100 * step) * (1.0 / rate_hz)
+    assert np.any(faster_s[::step] != time_s)
+    slow, fast = (make_tracker().measure_take(np.repeat(at_s[:, None], 2, axis=1)) for at_s in (time_s, faster_s))
+    np.testing.assert_allclose(fast.position_m[::step], slow.position_m, rtol=0.0, atol=1e-9)
+    np.testing.assert_array_equal(fast.ranges_received[::step], slow.ranges_received)

@@ -10,6 +10,7 @@ from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.mocap import synthetic
 from harness.simulate.noise import Noise, noise_preset
+from harness.simulate.physics import schedule
 from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.inertial import Inertial
 from harness.simulate.physics.settings import Physics
@@ -55,7 +56,9 @@ def test_counts_are_summed_over_the_last_slots() -> None:
     assert sum_window(ring, -9, 3) == 1 + 0 + 9  # slots before the take are negative
 
 
-def test_an_ankle_that_hears_few_ranges_is_lost_for_moments_only() -> None:
+def test_an_ankle_that_hears_few_ranges_is_lost_for_moments_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All emitters of `hall` fire in turn, so that it hears few."""
+    monkeypatch.setattr(schedule, "NEAR_EMITTERS", 36)
     clip = synthetic.generate("walking", "p1", 1, seed=1, duration_s=8.0)
     body, take = retarget_to_own_body(clip)
     physics, tracker = Physics(), TrackerConfig()

@@ -1,4 +1,4 @@
-"""The rows of `harness bench physics --truth` on few seeds, and that they notice parts that are missing."""
+"""The rows of one station on few seeds, and that they notice parts that are missing."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from harness.bench.physics import scenes, truth
+from harness.bench.physics import scenes, single_station
 from harness.results.findings import BenchmarkStatement
 from harness.simulate.physics import Physics
 
@@ -19,13 +19,13 @@ SEEDS = tuple(range(101, 115))
 @pytest.mark.parametrize(
     ("rows", "count"),
     [
-        (truth.rest_row, 1),
-        pytest.param(truth.free_rows, 3, marks=pytest.mark.slow),
-        (truth.speed_row, 1),
-        (truth.turned_row, 1),
-        pytest.param(truth.hand_row, 1, marks=pytest.mark.slow),
-        (truth.temperature_row, 1),
-        (truth.covered_row, 2),
+        (single_station.rest_row, 1),
+        pytest.param(single_station.free_rows, 3, marks=pytest.mark.slow),
+        (single_station.speed_row, 1),
+        (single_station.turned_row, 1),
+        pytest.param(single_station.hand_row, 1, marks=pytest.mark.slow),
+        (single_station.temperature_row, 1),
+        (single_station.covered_row, 2),
     ],
 )
 def test_every_row_is_met(rows: Callable[[tuple[int, ...]], list[BenchmarkStatement]], count: int) -> None:
@@ -37,12 +37,12 @@ def test_every_row_is_met(rows: Callable[[tuple[int, ...]], list[BenchmarkStatem
 
 def changed(monkeypatch: pytest.MonkeyPatch, **changes: object) -> None:
     """Let the rows use other defaults of the physics."""
-    monkeypatch.setattr(truth, "Physics", lambda: replace(Physics(), **changes))  # type: ignore[arg-type]
+    monkeypatch.setattr(single_station, "Physics", lambda: replace(Physics(), **changes))  # type: ignore[arg-type]
 
 
 def test_a_row_is_missed_where_ranges_are_worse(monkeypatch: pytest.MonkeyPatch) -> None:
     changed(monkeypatch, sound=replace(Physics().sound, range_noise_m=0.01))
-    (row,) = truth.rest_row(SEEDS[:3])
+    (row,) = single_station.rest_row(SEEDS[:3])
     assert row.verdict == "missed"
     assert row.text == "static, spread of 3-D position"
 
@@ -50,22 +50,22 @@ def test_a_row_is_missed_where_ranges_are_worse(monkeypatch: pytest.MonkeyPatch)
 def test_the_temperature_row_is_missed_where_the_device_measures_the_temperature(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(truth, "_WARMER_K", 0.0)
+    monkeypatch.setattr(single_station, "_WARMER_K", 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        (row,) = truth.temperature_row(SEEDS[:2])
+        (row,) = single_station.temperature_row(SEEDS[:2])
     assert row.verdict == "missed"
 
 
 @pytest.mark.slow
 def test_excursions_need_the_shadow(monkeypatch: pytest.MonkeyPatch) -> None:
     changed(monkeypatch, room=replace(Physics().room, shadow=False))
-    assert truth.free_rows(SEEDS[:3])[0].verdict == "missed"
+    assert single_station.free_rows(SEEDS[:3])[0].verdict == "missed"
 
 
 @pytest.mark.long
 def test_a_filter_that_never_gives_a_station_up_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     changed(monkeypatch, fusion=replace(Physics().fusion, sigma_limit_m=10.0, coast_s=60.0))
-    assert truth.covered_row(SEEDS[:3])[1].verdict == "missed"
+    assert single_station.covered_row(SEEDS[:3])[1].verdict == "missed"
 
 
 def test_a_station_is_lost_rather_than_wrong_while_an_accelerometer_is_at_its_limit() -> None:
