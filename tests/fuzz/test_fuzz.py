@@ -18,7 +18,7 @@ from tests.fuzz.campaign import changed_data, files_of, run_cases
 from tests.fuzz.kinds import KINDS
 
 SEED = 1
-FEW, MANY = 650, 10_000
+FEW, MANY = 720, 10_000
 """Numbers of files of all kinds."""
 
 

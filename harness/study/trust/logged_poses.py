@@ -12,7 +12,7 @@ from harness.study.trust.capture_readings import CaptureReadings, read_capture
 from harness.study.trust.pose_source import holds_poses, read_poses
 from harness.study.trust.truth_motion import TruthMotion, pair_names
 
-_CONVENTIONS = ("body", "gaps", "left out", "length unit", "quaternion order")
+_CONVENTIONS = ("body", "gaps", "untracked", "left out", "length unit", "quaternion order")
 """Findings about a reference that its results rest on."""
 _FLAGS = {"length unit": "unit", "quaternion order": "quaternion"}
 """Finding -> option that replaces it."""

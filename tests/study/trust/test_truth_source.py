@@ -83,7 +83,7 @@ def test_the_table_of_replay_is_read_back(tmp_path: Path) -> None:
     np.testing.assert_allclose(truth.bodies["hand"].world_from_body, turn, atol=1e-12)
     np.testing.assert_allclose(truth.bodies["hand"].time_s, np.arange(FRAMES) / 40.0 + 1e-3, atol=1e-12)
     assert len(truth.bodies["head"].time_s) == FRAMES - 1
-    assert any(note.startswith("Reference: gaps of head: 1 of 60 rows") for note in truth.notes)
+    assert any(note.startswith("Reference: untracked rows of head: 1 of 60 left out") for note in truth.notes)
 
 
 def test_bodies_have_the_names_of_stations_in_any_letters_and_some_suffice(tmp_path: Path) -> None:
