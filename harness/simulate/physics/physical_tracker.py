@@ -12,6 +12,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
+from harness.core.seeds import generator
 from harness.core.stream_health import ENOUGH_EMITTERS
 from harness.simulate.physics.constellation import Constellation
 from harness.simulate.physics.fusion import FusionFilter, empty_outputs
@@ -59,6 +60,14 @@ class PhysicalTracker:
         self.ranging: RangeSource = Ranging(
             physics.sound, true, self.schedule, placed, sight, stations, seed=seed, take=take, session=session
         )
+        microphone_m = np.array(
+            [
+                generator(seed, "physics", session or take, "microphones", station).normal(
+                    physics.sound.microphones_m, physics.sound.microphone_sd_m
+                )
+                for station in stations
+            ]
+        )
         self.unit = InertialUnit(inertial, stations, seed=seed, take=take, session=session)
         self.fusion = FusionFilter(
             physics.fusion,
@@ -66,6 +75,7 @@ class PhysicalTracker:
             inertial,
             constellation.position_m,
             constellation.normal,
+            microphone_m,
             self.schedule,
             stations,
         )

@@ -41,8 +41,8 @@ class Physics:
         """The physics under a noise preset.
 
         `default` has every cause of errors. `noise` has no shadow, echo, burst or wrong cycle. `clean` also has no
-        noise of ranges and inertia, no limit of the inertial sensors, no air flow, no survey error and no temperature
-        error. Cones and reaches of emitters hold under each.
+        noise of ranges and inertia, no limit of the inertial sensors, no air flow, no survey error, no misplaced
+        microphone and no temperature error. Cones and reaches of emitters hold under each, and so does the filter.
         """
         if noise == "default":
             return self
@@ -51,7 +51,12 @@ class Physics:
         if noise == "noise":
             return replace(self, room=room, sound=sound)
         exact = replace(
-            sound, range_noise_m=0.0, air_speed_sd_m_s=0.0, temperature_sd_c=0.0, temperature_c=sound.assumed_c
+            sound,
+            range_noise_m=0.0,
+            air_speed_sd_m_s=0.0,
+            temperature_sd_c=0.0,
+            temperature_c=sound.assumed_c,
+            microphone_sd_m=0.0,
         )
         return replace(
             self,

@@ -41,7 +41,7 @@ def changed(monkeypatch: pytest.MonkeyPatch, **changes: object) -> None:
 
 
 def test_a_row_is_missed_where_ranges_are_worse(monkeypatch: pytest.MonkeyPatch) -> None:
-    changed(monkeypatch, sound=replace(Physics().sound, range_noise_m=0.01))
+    changed(monkeypatch, sound=replace(Physics().sound, range_noise_m=0.0025))
     (row,) = single_station.rest_row(SEEDS[:3])
     assert row.verdict == "missed"
     assert row.text == "static, spread of 3-D position"
