@@ -45,7 +45,7 @@ class Fusion(CheckedFields):
     jumps are the published resolution of 0.75 mm and 0.05 deg (docs/is900.md 13.2) [choice]."""
     accelerometer: SensorModel = ACCELEROMETER
     """Its noise is that of the sensors, its bias a little more [choice]."""
-    inertial_scale: Annotated[float, Range(0.0, 0.1)] = 0.002
+    inertial_scale: Annotated[float, Range(0.0, 0.1)] = 0.003
     """Assumed standard deviation of scale and misalignment of the inertial sensors [choice]."""
     sigma_limit_m: Annotated[float, Range(1e-3, 10.0)] = 0.03
     """Standard deviation of the position beyond which the station is suspect and has quality 0 [m] [choice]."""

@@ -55,7 +55,7 @@ class Gyroscope(InertialErrors):
     correlation_s: Time = 100.0
     random_walk: Spread = float(np.deg2rad(0.0001))
     turn_on: Spread = float(np.deg2rad(0.02))
-    scale: Spread = 0.01
+    scale: Spread = 0.02
     misalignment_rad: Spread = float(np.deg2rad(0.1))
     limit: Limit = float(np.deg2rad(1200.0))
 
@@ -74,7 +74,7 @@ class Accelerometer(InertialErrors):
     correlation_s: Time = 100.0
     random_walk: Spread = 2e-5
     turn_on: Spread = 0.025
-    scale: Spread = 0.01
+    scale: Spread = 3e-3
     misalignment_rad: Spread = float(np.deg2rad(0.1))
     limit: Limit = 160.0
 

@@ -54,24 +54,18 @@ class PhysicalTracker:
 
         `seed`, `take` and `session` key the random draws.
         """
-        stations, inertial = source.stations, physics.inertial
+        stations, sound, inertial = source.stations, physics.sound, physics.inertial
         self.schedule = Schedule(inertial.rate_hz, len(constellation))
         true = constellation.with_survey_error(physics.constellation.survey_sd_m, seed, session or take)
         self.ranging: RangeSource = Ranging(
-            physics.sound, true, self.schedule, placed, sight, stations, seed=seed, take=take, session=session
+            sound, true, self.schedule, placed, sight, stations, seed=seed, take=take, session=session
         )
-        microphone_m = np.array(
-            [
-                generator(seed, "physics", session or take, "microphones", station).normal(
-                    physics.sound.microphones_m, physics.sound.microphone_sd_m
-                )
-                for station in stations
-            ]
-        )
+        rngs = [generator(seed, "physics", session or take, "microphones", station) for station in stations]
+        microphone_m = np.array([rng.normal(sound.microphones_m, sound.microphone_sd_m) for rng in rngs])
         self.unit = InertialUnit(inertial, stations, seed=seed, take=take, session=session)
         self.fusion = FusionFilter(
             physics.fusion,
-            physics.sound,
+            sound,
             inertial,
             constellation.position_m,
             constellation.normal,
