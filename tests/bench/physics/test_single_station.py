@@ -13,6 +13,8 @@ from harness.simulate.physics import Physics
 
 SEEDS = tuple(range(101, 115))
 """Not those of the table."""
+MORE_SEEDS = tuple(range(101, 131))
+"""The first step of speed is 0.09 mm: fewer seeds do not tell it from none."""
 
 
 @pytest.mark.long
@@ -29,7 +31,7 @@ SEEDS = tuple(range(101, 115))
     ],
 )
 def test_every_row_is_met(rows: Callable[[tuple[int, ...]], list[BenchmarkStatement]], count: int) -> None:
-    found = rows(SEEDS)
+    found = rows(MORE_SEEDS if rows is single_station.speed_row else SEEDS)
     assert len(found) == count
     for row in found:
         assert row.verdict == "met", f"{row.text}: {row.measured}"
