@@ -205,6 +205,7 @@ def test_windows_do_not_grow_with_emitters_that_do_not_fire() -> None:
     models = [
         FusionFilter(
             *(Fusion(), Sound(), Inertial(), np.zeros((count, 3)), np.tile([0.0, 0.0, 1.0], (count, 1))),
+            np.zeros((1, 2, 3)),
             Schedule(TICK_HZ, count),
             ["a"],
         ).model

@@ -112,7 +112,8 @@ def known_microphones(session: str, take: str = "t", count: int = 200) -> Floats
     placed = PlacedRoom(physics.room, np.zeros(2), WORLD_FROM_TRACKER, np.array(TRACKER.origin_m))
     constellation = load_constellation(physics.constellation)
     tracker = PhysicalTracker(source, physics, constellation, placed, None, seed=1, take=take, session=session)
-    return tracker.fusion.model.ranging.arm_m + np.array(physics.inertial.lever_m)
+    out: Floats = tracker.fusion.model.ranging.arm_m + np.array(physics.inertial.lever_m)
+    return out
 
 
 def test_the_device_misplaces_the_microphones_of_each_station_for_a_session() -> None:
