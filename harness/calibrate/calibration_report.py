@@ -44,7 +44,8 @@ def report_pose_calibration(result: PoseCalibration) -> CalibrationReport:
         }
         for row, station in enumerate(stations)
     }
-    miss_deg = {pose.name: deg for pose, deg in zip(POSES, np.rad2deg(result.pose_error_rad).tolist(), strict=True)}
+    names_of_poses = [POSES[number].name for number in result.pose_numbers]
+    miss_deg = dict(zip(names_of_poses, np.rad2deg(result.pose_error_rad).tolist(), strict=True))
     diagnostics = {
         "seconds": result.seconds,
         "miss_deg": float(np.rad2deg(result.hinge_error_rad)),
@@ -91,7 +92,7 @@ def _fit_lines(result: PoseCalibration, miss_deg: Mapping[str, float]) -> list[s
         f"hinges are off the poses by {np.rad2deg(result.hinge_error_rad):.1f} deg, "
         f"{worst!r} by {miss_deg[worst]:.1f} deg",
         f"trackers sit {result.mount_spread:.1f} times as far from their mounts as is usual",
-        f"condition number {result.condition:.3g}; poses held for {result.seconds:.1f} s in all",
+        f"condition number {result.condition:.3g}; {len(miss_deg)} poses held for {result.seconds:.1f} s in all",
         *(f"hint: {hint}" for hint in result.hints),
     ]
 
@@ -168,9 +169,9 @@ def tpose_verdict(result: TPoseCalibration) -> str:
 
 def _missed_text(result: PoseCalibration, pose: int) -> str:
     off_m = result.pose_distance_m[pose]
-    station = int(np.argmax(off_m))
+    station, number = int(np.argmax(off_m)), result.pose_numbers[pose]
     return (
-        f"pose {pose + 1} ({POSES[pose].name}) was missed: {result.calibration.stations[station]} was "
+        f"pose {number + 1} ({POSES[number].name}) was missed: {result.calibration.stations[station]} was "
         f"{1e2 * off_m[station]:.0f} cm from its place, hinges {np.rad2deg(result.pose_error_rad[pose]):.1f} deg off"
     )
 

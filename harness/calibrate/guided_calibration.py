@@ -83,7 +83,8 @@ class PoseGuide:
                 say(str(rejected))
             self._rejected_count = len(self.collector.rejected)
             if recorded is not None:
-                say(f"pose {recorded} of {len(self._poses)} taken, held from {self.collector.began_s[-1]:.1f} s on")
+                taken = f"pose {recorded} of {len(self._poses)} taken, held from {self.collector.began_s[-1]:.1f} s on"
+                say(taken if self.collector.holds[-1] else self.collector.message)
                 if self.collector.done:
                     return
                 self._announce_pose(say)
@@ -120,7 +121,7 @@ class PoseGuide:
 def incomplete_poses_error(collector: PoseCollector, poses: Sequence[CalibrationPose]) -> UnusableHold:
     """The error for a stream that ended before all poses were held; it lists the holds."""
     times = ", ".join(f"{start_s:.1f} s" for start_s in collector.began_s)
-    held = f"{len(collector.holds)} of {len(poses)} poses were held" + (f", at {times}" if times else "")
+    held = f"{len(collector.began_s)} of {len(poses)} poses were held" + (f", at {times}" if times else "")
     rejected = "; ".join(map(str, collector.rejected))
     missing = poses[len(collector.holds)]
     return UnusableHold(

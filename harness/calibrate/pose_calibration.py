@@ -8,7 +8,7 @@ Differences from eq. 1:
 - Bones may point elsewhere than the mean skeleton's, as far as people's bones differ.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,7 @@ from harness.body import Mount, pose_from_qpos, sole_heights_m
 from harness.calibrate import pose_checks
 from harness.calibrate.bundle_adjustment import BundleAdjustment
 from harness.calibrate.bundle_fit import BundleFit, CalibrationUncertainty, estimate_uncertainty, fit_bundle
-from harness.calibrate.hold import HoldReadings, measure_hold
+from harness.calibrate.hold import HoldReadings, UnusableHold, measure_hold
 from harness.calibrate.poses import POSES, pose_angles_rad
 from harness.calibrate.skeleton_prior import SkeletonPrior
 from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER
@@ -31,6 +31,8 @@ from harness.stream import TrackerFrame
 
 FLOOR_M, FLOOR_RAD = 5e-5, float(np.deg2rad(0.005))
 """Smallest standard deviation of a median reading [m, rad] [choice]; the scatter of each hold is added to it."""
+LEAST_POSES = 5
+"""Fewest poses of a calibration [choice]. The first is always among them."""
 LEAST_VARIANCE_REDUCTION = 0.9
 """A length is called "from the prior" unless the trackers reduce its variance among people by this share."""
 _SD_PER_QUARTILE = 1.0 / 2.027
@@ -53,6 +55,8 @@ class PoseCalibration(CalibrationUncertainty):
     """(S,) root mean square position residual over the poses [m]."""
     residual_rad: Floats
     """(S,) root mean square orientation residual over the poses [rad]."""
+    pose_numbers: tuple[int, ...]
+    """(P,) index of each pose in `poses.POSES`; the others were left out."""
     hinge_error_rad: float
     """Error of the performer's poses, standard deviation of a hinge [rad]."""
     pose_error_rad: Floats
@@ -80,34 +84,48 @@ def calibrate_poses(
 ) -> PoseCalibration:
     """Estimate skeleton, mounts and room from the frames of the eight holds, in the order of `poses.POSES`.
 
-    `mounts` are the nominal positions of the trackers, in the order of the stream's stations; orientations are free.
+    A hold without frames is left out. `mounts` are the nominal positions of the trackers, in the order of the stream's
+    stations; orientations are free.
     UnusableHold names the pose and the station and what to do. BadInput for a wrong number of poses or stations.
     """
     holds = measure_poses(held, mounts)
     bundle = pose_bundle(holds, space, mounts)
     pose_checks.require_no_boresight(bundle)
-    fit = fit_bundle(bundle, *_reading_sd(holds))
-    pose_checks.require_poses_held(bundle, fit)
-    return _assemble(bundle, fit, estimate_uncertainty(bundle, fit), sum(hold.seconds for hold in holds))
+    fit = fit_bundle(bundle, *_reading_sd(list(holds.values())))
+    numbers = tuple(holds)
+    pose_checks.require_poses_held(bundle, fit, numbers)
+    seconds = sum(hold.seconds for hold in holds.values())
+    return _assemble(bundle, fit, numbers, estimate_uncertainty(bundle, fit), seconds)
 
 
-def measure_poses(held: Sequence[Sequence[TrackerFrame]], mounts: Sequence[Mount]) -> list[HoldReadings]:
-    """Median readings of the eight holds, in the order of `poses.POSES`; UnusableHold, BadInput."""
+def measure_poses(held: Sequence[Sequence[TrackerFrame]], mounts: Sequence[Mount]) -> dict[int, HoldReadings]:
+    """Median readings of the holds by the pose's index in `poses.POSES`, without holds that have no frames.
+
+    UnusableHold, also without the first pose or with fewer than `LEAST_POSES`. BadInput.
+    """
     if len(held) != len(POSES):
         raise BadInput(
             f"{len(held)} poses were held; {len(POSES)} are needed.",
             f"Hold these, one after another: {', '.join(pose.name for pose in POSES)}.",
         )
     names = [mount.station for mount in mounts]
-    return [measure_hold(rows, names, pose.name) for rows, pose in zip(held, POSES, strict=True)]
+    numbers = [number for number, rows in enumerate(held) if rows]
+    if 0 not in numbers or len(numbers) < LEAST_POSES:
+        raise UnusableHold(
+            f"Only {len(numbers)} of the poses were held while all stations reported; the first and "
+            f"{LEAST_POSES - 1} others are needed.",
+            "Stand where the emitters reach all stations, and hold the poses again.",
+        )
+    return {number: measure_hold(held[number], names, POSES[number].name) for number in numbers}
 
 
-def pose_bundle(holds: Sequence[HoldReadings], space: SkeletonPrior, mounts: Sequence[Mount]) -> BundleAdjustment:
-    """The least-squares problem of the eight holds, with the poses as shown."""
+def pose_bundle(holds: Mapping[int, HoldReadings], space: SkeletonPrior, mounts: Sequence[Mount]) -> BundleAdjustment:
+    """The least-squares problem of the holds, by the pose's index in `poses.POSES`, with the poses as shown."""
     like = humanoid24.standard_skeleton()
-    nominal_rad = np.array([pose_angles_rad(pose, like) for pose in POSES])
-    turn = rotations.multiply(LEVEL_FROM_TRACKER, np.array([hold.tracker_from_station for hold in holds]))
-    place_m = rotations.rotate(LEVEL_FROM_TRACKER, np.array([hold.position_m for hold in holds]))
+    nominal_rad = np.array([pose_angles_rad(pose, like) for pose in map(POSES.__getitem__, holds)])
+    readings = holds.values()
+    turn = rotations.multiply(LEVEL_FROM_TRACKER, np.array([hold.tracker_from_station for hold in readings]))
+    place_m = rotations.rotate(LEVEL_FROM_TRACKER, np.array([hold.position_m for hold in readings]))
     return BundleAdjustment(SharedUnknowns(like, space, mounts), nominal_rad, place_m, rotations.to_matrix(turn))
 
 
@@ -136,7 +154,11 @@ def calibration_of(kind: str, at: CalibrationSolution, skeleton: Skeleton, mount
 
 
 def _assemble(
-    bundle: BundleAdjustment, fit: BundleFit, uncertainty: CalibrationUncertainty, seconds: float
+    bundle: BundleAdjustment,
+    fit: BundleFit,
+    numbers: tuple[int, ...],
+    uncertainty: CalibrationUncertainty,
+    seconds: float,
 ) -> PoseCalibration:
     at, mounts = fit.solution, bundle.shared.mounts
     skeleton = bundle.shared.template.with_bones(at.bone_m)
@@ -150,6 +172,7 @@ def _assemble(
         from_prior=uncertainty.variance_reduction < LEAST_VARIANCE_REDUCTION,
         residual_m=np.sqrt(np.mean(np.sum(off_m**2, axis=2), axis=0)),
         residual_rad=np.sqrt(np.mean(np.sum(off_rad**2, axis=2), axis=0)),
+        pose_numbers=numbers,
         hinge_error_rad=fit.scales.pose_error_rad,
         pose_error_rad=fit.pose_error_rad,
         pose_distance_m=pose_checks.pose_distances_m(bundle, fit),

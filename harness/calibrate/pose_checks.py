@@ -131,8 +131,11 @@ def require_no_boresight(bundle: BundleAdjustment) -> None:
     )
 
 
-def require_poses_held(bundle: BundleAdjustment, fit: BundleFit) -> None:
-    """UnusableHold when a pose was not held as shown, or when stations are exchanged."""
+def require_poses_held(bundle: BundleAdjustment, fit: BundleFit, numbers: Sequence[int]) -> None:
+    """UnusableHold when a pose was not held as shown, or when stations are exchanged.
+
+    `numbers` (P,) are the poses' indices in `poses.POSES`.
+    """
     require_heading(fit.heading_sd_rad, bundle.shared.mounts)
     worst = int(np.argmax(fit.pose_error_rad))
     usual = OUTLIER_RATIO * float(np.median(fit.pose_error_rad))
@@ -143,10 +146,11 @@ def require_poses_held(bundle: BundleAdjustment, fit: BundleFit) -> None:
     off_m = pose_distances_m(bundle, fit)[worst]
     station = int(np.argmax(off_m))
     off_deg, off_mm = np.rad2deg(fit.pose_error_rad[worst]), 1e3 * off_m[station]
+    number = numbers[worst]
     raise UnusableHold(
-        f"Pose {worst + 1} ({POSES[worst].name}) was not held as shown: hinges are {off_deg:.0f} deg off (RMS); "
+        f"Pose {number + 1} ({POSES[number].name}) was not held as shown: hinges are {off_deg:.0f} deg off (RMS); "
         f"station {mounts[station].station!r} is the farthest from its place in it, {off_mm:.0f} mm.",
-        f"Hold it again: {POSES[worst].instruction}",
+        f"Hold it again: {POSES[number].instruction}",
     )
 
 

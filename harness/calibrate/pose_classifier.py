@@ -46,6 +46,7 @@ class PoseClassifier:
     def distances_m(self, now: HoldReadings, first: HoldReadings | None = None) -> Floats:
         """(N,) RMS distance of the stations from each pose [m], at the best position, heading and size.
 
+        Stations whose position is NaN do not count.
         With the readings of the `first` pose, rotations since then count as well.
         """
         return np.array([self._distance_m(now, first, pose) for pose in range(len(self._place_m))])
@@ -72,13 +73,14 @@ class PoseClassifier:
         return level_m / size + self._middle_m[pose], np.linalg.norm(away_m, axis=1)
 
     def _distance_m(self, now: HoldReadings, first: HoldReadings | None, pose: int) -> float:
-        heading, away_m = _align(now.position_m, self._place_m[pose])
+        heard = np.isfinite(now.position_m).all(axis=1)
+        heading, away_m = _align(now.position_m[heard], self._place_m[pose, heard])
         squares = np.sum(away_m**2, axis=1)
         if first is not None:
             before, _ = _align(first.position_m, self._place_m[0])
-            turned = rotations.multiply(now.tracker_from_station, rotations.inverse(first.tracker_from_station))
+            turned = rotations.multiply(now.tracker_from_station, rotations.inverse(first.tracker_from_station))[heard]
             seen = rotations.multiply(rotations.multiply(heading, turned), rotations.inverse(before))
-            squares = squares + (LEVER_M * rotations.angle_between_rad(seen, self._turned[pose])) ** 2
+            squares = squares + (LEVER_M * rotations.angle_between_rad(seen, self._turned[pose, heard])) ** 2
         return float(np.sqrt(np.mean(squares)))
 
 
@@ -91,7 +93,10 @@ def _align(found_m: Floats, place_m: Floats) -> tuple[Floats, Floats]:
 
     Both sets are taken about their means, at the size that fits best.
     """
-    level_m = rotations.rotate(LEVEL_FROM_TRACKER, found_m - found_m.mean(axis=0))
+    level_m, place_m = (
+        rotations.rotate(LEVEL_FROM_TRACKER, found_m - found_m.mean(axis=0)),
+        place_m - place_m.mean(axis=0),
+    )
     a, b = (points[:, :2] @ [1.0, 1.0j] for points in (level_m, place_m))
     heading = rotations.about_z(float(np.angle(np.vdot(a, b))))
     turned_m = rotations.rotate(heading, level_m)

@@ -3,7 +3,8 @@
 A hold is a stretch of `HOLD_S` seconds in which every station is still (by the rules of `hold`). Its beginning and
 end are cut off, and readings outside the sway limit are marked as suspect. The next hold counts only if a station has
 moved since the last one. With a `PoseClassifier` the hold must also look like the pose that is wanted, so a rest, a
-repeated pose or a skipped pose never shifts the order.
+repeated pose or a skipped pose never shifts the order. A pose in which up to half of the stations are silent is left
+out if the others say that it is held: the emitters may not reach a station in it.
 """
 
 from collections import deque
@@ -12,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.calibrate.hold import SWAY_M, HoldReadings, UnusableHold, measure_hold, span_s
+from harness.calibrate.hold import LEAST_SHARE, SWAY_M, HoldReadings, UnusableHold, measure_hold, span_s
 from harness.calibrate.pose_classifier import PoseClassifier
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
@@ -25,6 +26,8 @@ STEADY_SHARE = 0.65
 itself is off at times, at one station at a time (docs/is900.md 13.1); a performer moves several stations [choice]."""
 CHECK_EVERY_S = 0.2
 """Time between two checks for a hold [s] [choice]."""
+MOST_LEFT_OUT = 3
+"""Most poses that may be left out [choice]."""
 GAP_S = 0.5
 """A gap between frames longer than this starts the search for a hold anew [s] [choice]."""
 MOVED_M, MOVED_RAD = 0.10, float(np.deg2rad(20.0))
@@ -49,7 +52,7 @@ class PoseCollector:
     def __init__(self, stations: Sequence[str], poses: int = 8, classifier: PoseClassifier | None = None) -> None:
         self.stations, self.poses = tuple(stations), poses
         self.holds: list[list[TrackerFrame]] = []
-        """Frames of each pose taken, without the edges."""
+        """Frames of each pose, without the edges; none of a pose that is left out."""
         self.began_s: list[float] = []
         """Beginning of each hold, since the first frame [s]."""
         self.rejected: list[RejectedHold] = []
@@ -68,7 +71,7 @@ class PoseCollector:
         return len(self.holds) >= self.poses
 
     def add(self, frame: TrackerFrame) -> int | None:
-        """Take up a frame; returns the number of complete poses if this frame completed one, else None."""
+        """Take up a frame; returns the number of poses that are done if this frame completed one, else None."""
         now_s, window = frame.received_s, self._window
         self._began_s = now_s if self._began_s is None else self._began_s
         if window and now_s - window[-1].received_s > GAP_S:
@@ -115,7 +118,8 @@ class PoseCollector:
             still = measure_hold(kept, self.stations)
         except UnusableHold as error:
             self.message = f"hold still: {error.what}"
-            return None
+            heard = np.mean([frame.position_valid & frame.orientation_valid for frame in kept], axis=0) >= LEAST_SHARE
+            return self._leave_out(statistics, heard)
         self._last = statistics
         return self._held(kept, still)
 
@@ -134,6 +138,26 @@ class PoseCollector:
             if np.sum(strayed > share) >= least:
                 return self.stations[int(np.argmax(strayed))]
         return None
+
+    def _leave_out(self, statistics: "_HoldStatistics", heard: Bools) -> int | None:
+        """Leave out the wanted pose if the stations that are heard (S,) say that it is held; the number of poses done.
+
+        None if it is not left out: the first pose never is, nor one in which all stations are heard.
+        """
+        wanted = len(self.holds)
+        if (
+            not 0 < wanted < self.poses
+            or not 0.5 <= np.mean(heard) < 1.0
+            or self.holds.count([]) >= MOST_LEFT_OUT
+            or self._classifier is None
+            or not self._classifier.matches(wanted, statistics.readings(heard), self._first)
+        ):
+            return None
+        self._last = statistics
+        self.holds.append([])
+        silent = ", ".join(name for name, is_heard in zip(self.stations, heard, strict=True) if not is_heard)
+        self.message = f"pose {wanted + 1} of {self.poses} left out: {silent} silent or lost"
+        return wanted + 1
 
     def _held(self, frames: list[TrackerFrame], still: HoldReadings) -> int | None:
         """Take or reject a hold that differs from the last one; returns the number of complete poses or None."""
@@ -166,6 +190,11 @@ class _HoldStatistics:
     """(S, 4)"""
     strayed: Bools
     """(F, S) whether a reading is farther from the median than sway and the station's noise explain."""
+
+    def readings(self, heard: Bools) -> HoldReadings:
+        """The medians as readings, NaN for stations that are not heard (S,)."""
+        zero = np.zeros(len(heard))
+        return HoldReadings(HOLD_S, np.where(heard[:, None], self.middle_m, np.nan), self.turn, zero, zero)
 
     def moved_from(self, before: "_HoldStatistics") -> bool:
         moved_m = np.linalg.norm(self.middle_m - before.middle_m, axis=1)

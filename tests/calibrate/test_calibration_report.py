@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.calibrate.calibration_report import pose_verdict, poses_to_repeat, tpose_verdict
+from harness.calibrate.calibration_report import pose_verdict, poses_to_repeat, report_pose_calibration, tpose_verdict
 from harness.calibrate.pose_calibration import PoseCalibration, calibrate_poses
+from harness.calibrate.poses import POSES
 from harness.calibrate.tpose_calibration import TPoseCalibration
 from tests.calibrate.standing_model import SIX, Model, somebody, space
 
@@ -67,6 +68,17 @@ def test_the_verdict(
 def test_small_misses_are_not_repeated(found: PoseCalibration) -> None:
     assert poses_to_repeat(with_figures(found, 4.0, 0.8, [0.5, 2.9, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5])) == []
     assert poses_to_repeat(with_figures(found, 4.0, 0.8, [3.0, 4.6, 3.0, 5.0, 3.0, 3.0, 3.0, 3.0])) == [3, 1]
+
+
+def test_poses_keep_their_names_where_others_are_left_out() -> None:
+    model = Model(somebody(0), miss_rad=np.deg2rad(1.0))
+    held = [rows if number not in (2, 4) else [] for number, rows in enumerate(model.held())]
+    some = calibrate_poses(held, space(), model.mounts)
+    diagnostics, lines = report_pose_calibration(some)
+    assert list(diagnostics["miss_deg_of_pose"]) == [pose.name for n, pose in enumerate(POSES) if n not in (2, 4)]
+    assert any("6 poses held for" in line for line in lines)
+    missed = replace(some, pose_error_rad=np.deg2rad([1.0, 1.0, 1.0, 1.0, 3.4, 1.0]))
+    assert "pose 7 (squat) was missed" in pose_verdict(missed)
 
 
 def test_distances_are_those_of_the_missed_pose() -> None:

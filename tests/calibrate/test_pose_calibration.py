@@ -228,9 +228,24 @@ def test_stations_that_do_not_tell_the_heading_are_refused() -> None:
     shared = SharedUnknowns(standard_skeleton(), space(), model.mounts)
     bundle = BundleAdjustment(shared, nominal_rad, place_m, rotations.to_matrix(turn))
     found = fit_bundle(bundle, 0.001, 0.005)
-    pose_checks.require_poses_held(bundle, found)
+    pose_checks.require_poses_held(bundle, found, range(8))
     with pytest.raises(UnusableHold, match="torso, head do not determine which way the performer faces"):
-        pose_checks.require_poses_held(bundle, replace(found, heading_sd_rad=0.4))
+        pose_checks.require_poses_held(bundle, replace(found, heading_sd_rad=0.4), range(8))
+
+
+def test_poses_may_be_left_out_but_for_the_first() -> None:
+    """Five poses find the mounts of a noise-free performer; each pose is compared with itself."""
+    model = Model(somebody(3))
+    held = [rows if number in (0, 1, 3, 5, 6) else [] for number, rows in enumerate(model.held())]
+    found = calibrate_poses(held, space(), model.mounts)
+    assert found.pose_numbers == (0, 1, 3, 5, 6)
+    assert found.pose_error_rad.shape == (5,)
+    assert found.hinge_error_rad < np.deg2rad(0.5)
+    off_rad = rotations.angle_between_rad(found.calibration.bone_from_station, model.truth.bone_from_station)
+    assert np.rad2deg(off_rad).max() < 2.0
+    for without in (range(1, 8), range(4)):
+        with pytest.raises(UnusableHold, match="the first and 4 others are needed"):
+            calibrate_poses([rows if n in without else [] for n, rows in enumerate(held)], space(), model.mounts)
 
 
 def test_other_numbers_of_poses_or_stations_are_refused() -> None:

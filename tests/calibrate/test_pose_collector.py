@@ -169,18 +169,60 @@ def between(frames: Sequence[TrackerFrame], from_s: float, to_s: float) -> list[
     return [n for n, f in enumerate(frames) if from_s <= f.received_s - frames[0].received_s < to_s]
 
 
-def test_a_station_that_is_not_seen_is_named_and_waited_for() -> None:
+SILENT = {"position_valid": False, "orientation_valid": False, "position_m": np.nan}
+
+
+def silenced(from_s: float, to_s: float, *stations: int) -> list[TrackerFrame]:
+    """The eight poses, in which some stations are silent for some time; pose n is held from 4.5 n s on for 3 s."""
     frames = list(eight())
-    lost = between(frames, 4.5, 7.5)
-    silent = {"position_valid": False, "orientation_valid": False, "position_m": np.nan}
-    frames[lost[0] : lost[-1] + 1] = changed(frames[lost[0] : lost[-1] + 1], 2, **silent)
+    lost = between(frames, from_s, to_s)
+    for station in stations:
+        frames[lost[0] : lost[-1] + 1] = changed(frames[lost[0] : lost[-1] + 1], station, **SILENT)
+    return frames
+
+
+def test_a_station_that_is_not_seen_in_the_first_pose_is_named_and_waited_for() -> None:
     collector, told = PoseCollector(SIX, 8, classifier()), set()
-    for frame in frames:
+    for frame in silenced(0.0, 3.0, 2):
         collector.add(frame)
         told.add(collector.message)
-    assert len(collector.holds) == 1
-    assert "pose 3, and pose 2 is wanted" in collector.rejected[0].why
+    assert not collector.holds
+    assert "pose 2, and pose 1 is wanted" in collector.rejected[0].why
     assert any("'left_ankle' was silent or lost" in line for line in told)
+
+
+@pytest.mark.parametrize("stations", [(4,), (0, 4, 5)])
+def test_a_pose_that_some_stations_are_not_heard_in_is_left_out(stations: tuple[int, ...]) -> None:
+    said: list[str] = []
+    collector = PoseCollector(SIX, 8, classifier())
+    PoseGuide(collector, POSES).run(silenced(9.0, 12.2, *stations), said.append)
+    assert [len(hold) > 0 for hold in collector.holds] == [number != 2 for number in range(8)]
+    assert len(collector.began_s) == 7
+    names = ", ".join(SIX[station] for station in stations)
+    assert f"pose 3 of 8 left out: {names} silent or lost" in said
+    assert [line for line in said if line.startswith("pose 2 of 8 taken")]
+
+
+def test_a_pose_is_not_left_out_when_most_stations_are_silent_or_another_is_held() -> None:
+    collector, said = collected(silenced(9.0, 12.2, 0, 1, 2, 3))
+    assert said == [1, 2]
+    frames = stream([pose(0), pose(1), pose(3), arms_down()])
+    lost = between(frames, 9.0, 18.0)
+    frames[lost[0] :] = changed(frames[lost[0] :], 4, **SILENT)
+    collector, said = collected(frames)
+    assert said == [1, 2]
+    assert "'torso' was silent or lost" in collector.message
+
+
+def test_a_collector_that_knows_no_poses_leaves_none_out() -> None:
+    _, said = collected(silenced(9.0, 12.2, 4), blind=True)
+    assert said == list(range(1, 8))
+
+
+def test_three_poses_are_left_out_at_most() -> None:
+    collector, said = collected(silenced(4.4, 40.0, 4))
+    assert said == [1, 2, 3, 4]
+    assert collector.holds.count([]) == 3
 
 
 def test_a_silent_station_empties_the_meter() -> None:

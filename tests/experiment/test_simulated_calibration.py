@@ -31,6 +31,7 @@ from harness.reconstruct import FittedMeanPose, MeanPose, make_method
 from harness.report.run.text import run_table
 from harness.results import read_summary, select_cells
 from harness.simulate import Simulation, exact_calibration, simulate_tracker
+from harness.simulate.physics import Physics
 from harness.stream import TrackerFrame
 from tests.joint_centres import joint_centres_m
 
@@ -259,6 +260,18 @@ def test_eight_poses_find_bones_mounts_and_room(
     assert calibrated.errors["mount_mm"] < 0.7 * untold["mount_mm"]
     assert calibrated.errors["mount_deg"] < 6.0
     assert calibrated.errors["room_heading_deg"] < 10.0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("clip", ["walking_p1_01", "walking_p2_01", "walking_p3_01"])
+def test_eight_poses_calibrate_under_physics(clip: str) -> None:
+    """Bowed, the chest and the head hear too few emitters for a fix, whatever the filter; those poses are left out."""
+    straps = CalibrationSettings(beside_m=0.015, turned_deg=15.0)
+    scenario = replace(SMALL, physics=Physics(), calibration="poses", calibrating=straps)
+    errors = setting(scenario, clip).performer_calibration.errors
+    assert errors["mount_mm"] < 25.0
+    assert errors["mount_deg"] < 5.0
+    assert errors["length_mm"] < 12.0
 
 
 def test_nothing_of_the_performer_but_the_stream_is_told(

@@ -148,13 +148,16 @@ def test_what_is_worn_moves_the_tracker_as_with_statistics(worn_component: dict[
     ids=lambda c: next(iter(c)),
 )
 def test_tissue_and_straps_move_the_tracker_nearly_as_with_statistics(component: dict[str, Any]) -> None:
-    """The statistical model samples oscillations at the tracker's rate, so the rate is high here."""
+    """The statistical model samples oscillations at the tracker's rate, so the rate is high here.
+
+    It begins them at once; the physical tracker is not yet compared then.
+    """
     fast = TrackerConfig(rate_hz=160.0, baud=10_000_000, slot_s=0.0)
     with_it, without = (observed(Noise(**c), tracker=fast) for c in (component, {}))
     shift_m = positions_m(with_it) - positions_m(without)
     with_it, without = (observed(physical("clean", **c), tracker=fast) for c in (component, {}))
     off_m = positions_m(with_it) - positions_m(without) - shift_m
-    assert np.sqrt(np.nanmean(off_m**2)) < 0.2 * np.sqrt(np.mean(shift_m**2))
+    assert np.sqrt(np.nanmean(off_m[round(0.5 * fast.rate_hz) :] ** 2)) < 0.2 * np.sqrt(np.mean(shift_m**2))
 
 
 def test_prediction_and_enhancement_act_per_station() -> None:

@@ -67,8 +67,8 @@ class StationErrors:
     """(E,) times [s]."""
     error_m: Floats
     """(E, 3) reported minus true position, in the tracker's axes [m]."""
-    tilt_rad: Floats
-    """(E,) angle between the reported and the true vertical [rad]."""
+    turn_rad: Floats
+    """(E, 3) rotation vector from the true to the reported orientation, in the tracker's axes [rad]."""
     quality: Floats
     """(E,) 0 lost to 1 best."""
 
@@ -77,6 +77,12 @@ class StationErrors:
         """(E,) size of the position error [m]; NaN where the station is lost."""
         size_m: Floats = np.sqrt(np.sum(self.error_m**2, axis=1))
         return np.where(self.quality > 0.0, size_m, np.nan)
+
+    @property
+    def tilt_rad(self) -> Floats:
+        """(E,) angle between the reported and the true vertical [rad]; exact for small errors."""
+        out: Floats = np.hypot(self.turn_rad[:, 0], self.turn_rad[:, 1])
+        return out
 
     @property
     def rms_m(self) -> float:
@@ -183,10 +189,8 @@ def _errors(
     time_s: Floats, positions_m: tuple[Floats, Floats], turns: tuple[Floats, Floats], quality: Floats
 ) -> StationErrors:
     """The errors of the only station, from positions (E, 1, 3) and turns (E, 1, 4) that are reported and true."""
-    down = np.array([0.0, 0.0, 1.0])
-    one, other = (rotations.rotate(rotations.inverse(turn[:, 0]), down) for turn in turns)
-    tilt_rad = np.arccos(np.clip(np.sum(one * other, axis=1), -1.0, 1.0))
-    return StationErrors(time_s, positions_m[0][:, 0] - positions_m[1][:, 0], tilt_rad, quality[:, 0])
+    turn_rad = rotations.log(rotations.multiply(turns[0][:, 0], rotations.inverse(turns[1][:, 0])))
+    return StationErrors(time_s, positions_m[0][:, 0] - positions_m[1][:, 0], turn_rad, quality[:, 0])
 
 
 def track_hand(seed: int, seconds: float, physics: Physics, *, behind: bool) -> StationErrors:
@@ -241,7 +245,7 @@ def scaled_position_m(place_m: Floats, scale: float, physics: Physics) -> Floats
     heard = (distance_m <= constellation.range_m) & (cosine >= np.cos(constellation.cone_rad))
     noise = physics.fusion.range_noise_m, physics.fusion.range_scale, physics.fusion.survey_m
     emitters = constellation.position_m, constellation.normal
-    model = RangingModel(*emitters, np.zeros((1, 3)), 1.0, physics.sound.absorption_db_per_m, *noise)
+    model = RangingModel(*emitters, np.zeros((1, 1, 3)), 1.0, physics.sound.absorption_db_per_m, *noise)
     rays = enumerate(zip(distance_m, ray_m / distance_m[:, None], strict=True))
     sigma_m = np.sqrt([range_variance(model, j, r, x, y, z, z) for j, (r, (x, y, z)) in rays])[heard]
     emitters_m, measured_m = constellation.position_m[heard], scale * distance_m[heard]

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from harness.bench.physics.first_fix import first_fix_rows
 from harness.bench.physics.hall import hall_rows
+from harness.bench.physics.orientation import orientation_rows
 from harness.bench.physics.single_station import station_rows
 from harness.core.progress import ProgressCallback
 from harness.results.findings import BenchmarkStatement
@@ -17,6 +18,7 @@ FAMILIES: dict[str, Callable[[Sequence[int]], Iterable[BenchmarkStatement]]] = {
     "single station": station_rows,
     "first fix": first_fix_rows,
     "hall": hall_rows,
+    "orientation": orientation_rows,
 }
 """What is measured, and its rows over seeds."""
 

@@ -208,7 +208,7 @@ def update_slot(
         if np.isnan(range_m[m]):
             continue
         received += 1
-        remaining_s = state_at_arrival(model, motion, work.angles, range_m[m], model.ranging.arm_m[m], at)
+        remaining_s = state_at_arrival(model, motion, work.angles, range_m[m], model.ranging.arm_m[s, m], at)
         x = at[0] + at[3] - ranging.emitter_m[emitter, 0]
         y = at[1] + at[4] - ranging.emitter_m[emitter, 1]
         z = at[2] + at[5] - ranging.emitter_m[emitter, 2]
@@ -279,7 +279,7 @@ def acquire_slot(
         if np.isnan(range_m[m]):
             continue
         received += 1
-        remaining_s = state_at_arrival(model, motion, work.angles, range_m[m], model.ranging.arm_m[m], at)
+        remaining_s = state_at_arrival(model, motion, work.angles, range_m[m], model.ranging.arm_m[s, m], at)
         row = acquisition.ranges[s, acquisition.range_count[s] % acquisition.ranges.shape[1]]
         row[0], row[1], row[11] = path[6] - remaining_s, range_m[m], emitter
         for k in range(3):

@@ -15,7 +15,7 @@ class RangingModel(NamedTuple):
     normal: Floats
     """(J, 3) unit vectors along which the emitters send."""
     arm_m: Floats
-    """(M, 3) positions of the microphones from the inertial unit, in the station's axes."""
+    """(S, M, 3) where the device assumes each station's microphones, from the inertial unit, in the station's axes."""
     speed_m_s: float
     """Assumed speed of sound."""
     absorption_db_per_m: float

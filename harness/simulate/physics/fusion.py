@@ -20,7 +20,7 @@ from harness.simulate.physics.filter import filter_stations
 from harness.simulate.physics.filter_record import MODES
 from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.filter_state import AcquisitionState, FilterModel, FilterState, Outputs, RangingModel
-from harness.simulate.physics.inertial import Inertial, InertialErrors
+from harness.simulate.physics.inertial import Inertial
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.sound import MICROPHONES, Sound, speed_of_sound_m_s
 from harness.simulate.physics.strapdown import ERRORS, STATE
@@ -40,10 +40,13 @@ class FusionFilter:
         inertial: Inertial,
         emitter_m: Floats,
         normal: Floats,
+        microphone_m: Floats,
         schedule: Schedule,
         stations: Sequence[str],
     ) -> None:
-        """Emitters (J, 3) and their unit normals (J, 3) as the device knows them, in the tracker's frame [m]."""
+        """What the device knows: emitters (J, 3) [m] and their unit normals (J, 3) in the tracker's frame, and the
+        microphones (S, 2, 3) of each station in its axes [m].
+        """
         lever = np.array(inertial.lever_m)
         slot_s, turn = schedule.slot_s, schedule.turn_slots
         window = min(max(3 * turn, LEAST_WINDOW_SLOTS), LONGEST_WINDOW_SLOTS)
@@ -52,25 +55,23 @@ class FusionFilter:
         ranging = RangingModel(
             np.array(emitter_m, dtype=float),
             np.array(normal, dtype=float),
-            np.array(sound.microphones_m) - lever,
+            np.array(microphone_m) - lever,
             speed_of_sound_m_s(sound.assumed_c),
             sound.absorption_db_per_m,
             fusion.range_noise_m,
             fusion.range_scale,
             fusion.survey_m,
         )
-        gyroscope, accelerometer = inertial.gyroscope, inertial.accelerometer
+        sensors, models = (inertial.gyroscope, inertial.accelerometer), (fusion.gyroscope, fusion.accelerometer)
         self.model = FilterModel(
             ranging=ranging,
             tick_s=1.0 / schedule.tick_hz,
             lever_m=lever,
             gate=fusion.gate,
-            noise=np.array(
-                [gyroscope.white**2, accelerometer.white**2, _bias_density(gyroscope), _bias_density(accelerometer)]
-            ),
-            bias_variance=np.array([_bias_variance(gyroscope), _bias_variance(accelerometer)]),
+            noise=np.square([*(model.noise for model in models), *(model.bias_walk for model in models)]),
+            bias_variance=np.square([model.bias for model in models]),
             inertial_scale=fusion.inertial_scale,
-            limit=np.array([gyroscope.limit, accelerometer.limit]),
+            limit=np.array([errors.limit for errors in sensors]),
             sigma_limit_m=fusion.sigma_limit_m,
             reject_share=fusion.reject_share,
             coast_slots=int(fusion.coast_s / slot_s),
@@ -123,15 +124,6 @@ def empty_outputs(tick: Ints, fraction: Floats) -> Outputs:
         np.full((*shape, 3), np.nan),
         np.full((*shape, 4), np.nan),
     )
-
-
-def _bias_density(errors: InertialErrors) -> float:
-    """Density of a random walk [x^2/s] that grows as the Gauss-Markov bias at first, and the walk of the bias."""
-    return 2.0 * errors.bias_instability**2 / errors.correlation_s + errors.random_walk**2
-
-
-def _bias_variance(errors: InertialErrors) -> float:
-    return errors.turn_on**2 + errors.bias_instability**2
 
 
 def _initial_state(stations: int, slots: int, ranges: int) -> FilterState:

@@ -12,6 +12,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
+from harness.core.seeds import generator
 from harness.core.stream_health import ENOUGH_EMITTERS
 from harness.simulate.physics.constellation import Constellation
 from harness.simulate.physics.fusion import FusionFilter, empty_outputs
@@ -53,19 +54,22 @@ class PhysicalTracker:
 
         `seed`, `take` and `session` key the random draws.
         """
-        stations, inertial = source.stations, physics.inertial
+        stations, sound, inertial = source.stations, physics.sound, physics.inertial
         self.schedule = Schedule(inertial.rate_hz, len(constellation))
         true = constellation.with_survey_error(physics.constellation.survey_sd_m, seed, session or take)
         self.ranging: RangeSource = Ranging(
-            physics.sound, true, self.schedule, placed, sight, stations, seed=seed, take=take, session=session
+            sound, true, self.schedule, placed, sight, stations, seed=seed, take=take, session=session
         )
+        rngs = [generator(seed, "physics", session or take, "microphones", station) for station in stations]
+        microphone_m = np.array([rng.normal(sound.microphones_m, sound.microphone_sd_m) for rng in rngs])
         self.unit = InertialUnit(inertial, stations, seed=seed, take=take, session=session)
         self.fusion = FusionFilter(
             physics.fusion,
-            physics.sound,
+            sound,
             inertial,
             constellation.position_m,
             constellation.normal,
+            microphone_m,
             self.schedule,
             stations,
         )

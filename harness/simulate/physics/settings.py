@@ -1,7 +1,7 @@
 """The table `[physics]` of a scenario."""
 
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from harness.errors import BadInput
 from harness.simulate.physics.constellation import ConstellationSettings
@@ -41,8 +41,8 @@ class Physics:
         """The physics under a noise preset.
 
         `default` has every cause of errors. `noise` has no shadow, echo, burst or wrong cycle. `clean` also has no
-        noise of ranges and inertia, no limit of the inertial sensors, no air flow, no survey error and no temperature
-        error. Cones and reaches of emitters hold under each.
+        noise of ranges and inertia, no limit of the inertial sensors, no air flow, no survey error, no misplaced
+        microphone and no temperature error. Cones and reaches of emitters hold under each, and so does the filter.
         """
         if noise == "default":
             return self
@@ -50,9 +50,10 @@ class Physics:
         sound = replace(self.sound, bursts_per_min=0.0, wrong_cycle_share=0.0)
         if noise == "noise":
             return replace(self, room=room, sound=sound)
-        exact = replace(
-            sound, range_noise_m=0.0, air_speed_sd_m_s=0.0, temperature_sd_c=0.0, temperature_c=sound.assumed_c
+        none: dict[str, Any] = dict.fromkeys(
+            ("range_noise_m", "microphone_sd_m", "air_speed_sd_m_s", "temperature_sd_c"), 0.0
         )
+        exact = replace(sound, **none, temperature_c=sound.assumed_c)
         return replace(
             self,
             constellation=replace(self.constellation, survey_sd_m=0.0),
@@ -67,13 +68,5 @@ class Physics:
 
 
 def _without_errors(errors: E) -> E:
-    return replace(
-        errors,
-        white=0.0,
-        bias_instability=0.0,
-        random_walk=0.0,
-        turn_on=0.0,
-        scale=0.0,
-        misalignment_rad=0.0,
-        limit=1e6,
-    )
+    names = "white", "bias_instability", "random_walk", "turn_on", "scale", "misalignment_rad"
+    return replace(errors, **dict.fromkeys(names, 0.0), limit=1e6)

@@ -40,9 +40,9 @@ class Sound:
     """Standard deviation of the temperature between sessions [K]: a scale error of 0.1 % (docs/is900.md 13.5)."""
     assumed_c: Annotated[float, Range(-40.0, 60.0)] = 20.0
     """Temperature for which the device computes the speed of sound [deg C] [choice]."""
-    range_noise_m: Annotated[float, Range(0.0, 1.0)] = 0.002
+    range_noise_m: Annotated[float, Range(0.0, 1.0)] = 0.00075
     """Standard deviation of a range at 2 m on the axis of emitter and microphone [m]. It grows as the amplitude falls,
-    to about 4 mm in the mean. Chosen because the position at rest then varies by about the published 1.5 mm
+    to about 1.5 mm in the mean. Chosen because the position at rest then varies by about the published 1.5 mm
     (docs/is900.md 13.1)."""
     wrong_cycle_share: Annotated[float, Range(0.0, 1.0)] = 0.01
     """Share of ranges at 2 m on the axis that are one wavelength too long (docs/is900.md 13.3); it grows likewise
@@ -62,6 +62,9 @@ class Sound:
     microphones_m: tuple[Point, ...] = ((0.0, 0.03, 0.01), (0.0, -0.03, 0.01))
     """Positions of the two microphones in the station's axes [m]. The manual has two (docs/is900.md 7). They lie across
     the bone, so that the ranges fix the heading of a station on an upright bone [choice]."""
+    microphone_sd_m: Annotated[float, Range(0.0, 0.1)] = 0.00025
+    """Standard deviation of a microphone's place on each axis about the one that the device assumes, for a session [m]:
+    0.7 us of sound. Chosen because the yaw then has the published accuracy (docs/is900.md 13.1)."""
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -7,10 +7,10 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.simulate.physics.filter_settings import Fusion
+from harness.simulate.physics.filter_settings import Fusion, SensorModel
 from harness.simulate.physics.filter_state import Outputs
 from harness.simulate.physics.fusion import FusionFilter, empty_outputs
-from harness.simulate.physics.inertial import Accelerometer, Gyroscope, Inertial
+from harness.simulate.physics.inertial import Accelerometer, Gyroscope, Inertial, InertialErrors
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
 from harness.simulate.physics.sound import Sound, level_db, noise_factor, speed_of_sound_m_s
 from harness.simulate.physics.tracking_status import TRACKING
@@ -22,7 +22,20 @@ EMITTER_M: Floats = np.array([[x, y, -2.5] for x in (-1.2, 0.0, 1.2) for y in (-
 NORMAL: Floats = np.tile([0.0, 0.0, 1.0], (9, 1))
 FACING_UP: Floats = np.array([0.0, 1.0, 0.0, 0.0])
 RANGE_NOISE_M = Fusion().range_noise_m
-EXACT = Fusion(range_scale=0.0, survey_m=0.0, inertial_scale=0.0)
+
+
+def _matched(errors: InertialErrors) -> SensorModel:
+    return SensorModel(errors.white, errors.turn_on, errors.random_walk)
+
+
+EXACT = Fusion(
+    range_scale=0.0,
+    survey_m=0.0,
+    inertial_scale=0.0,
+    gyroscope=_matched(Gyroscope()),
+    accelerometer=_matched(Accelerometer()),
+)
+"""A filter that assumes what `noisy` adds to `exact_inertial`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +149,8 @@ def new_filter(
     """A filter of some stations under the nine emitters."""
     names = [f"station {s}" for s in range(stations)]
     schedule = Schedule(TICK_HZ, len(EMITTER_M))
-    return FusionFilter(fusion, Sound(), inertial or Inertial(), emitter_m, NORMAL, schedule, names)
+    microphone_m = np.tile(Sound().microphones_m, (stations, 1, 1))
+    return FusionFilter(fusion, Sound(), inertial or Inertial(), emitter_m, NORMAL, microphone_m, schedule, names)
 
 
 def records_every(ticks: int, slots: int, stations: int = 1, fraction: float = 0.0) -> Outputs:

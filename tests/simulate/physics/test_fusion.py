@@ -78,6 +78,20 @@ def test_noise_free_measurements_give_the_motion() -> None:
     np.testing.assert_allclose(outputs.velocity_m_s[1:, 0], station.velocity_m_s[tick], atol=0.02)
 
 
+def test_misplaced_microphones_turn_their_own_station() -> None:
+    """The device of the second station believes its microphones 2 deg about z from where they are."""
+    station = free_station(8.0, 3, speed=0.0)
+    fusion_filter = new_filter(2, inertial=exact_inertial())
+    turn = rotations.about_z(np.deg2rad(2.0))
+    arm_m = fusion_filter.model.ranging.arm_m
+    arm_m[1] = rotations.rotate(turn, arm_m[1])
+    outputs = run(fusion_filter, station, station)
+    for s, off in ((0, rotations.IDENTITY), (1, rotations.inverse(turn))):
+        expected = rotations.multiply(station.tracker_from_station[-1], off)
+        turned = rotations.angle_between_rad(outputs.tracker_from_station[-1, s, 0], expected)
+        assert np.degrees(turned) < 0.3
+
+
 @pytest.mark.parametrize("speed", [0.0, 1.0, 3.0])
 @pytest.mark.parametrize("seed", range(4))
 def test_starts_from_a_fix_within_two_seconds(seed: int, speed: float) -> None:
@@ -191,6 +205,7 @@ def test_windows_do_not_grow_with_emitters_that_do_not_fire() -> None:
     models = [
         FusionFilter(
             *(Fusion(), Sound(), Inertial(), np.zeros((count, 3)), np.tile([0.0, 0.0, 1.0], (count, 1))),
+            np.zeros((1, 2, 3)),
             Schedule(TICK_HZ, count),
             ["a"],
         ).model

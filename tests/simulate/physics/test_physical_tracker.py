@@ -5,17 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from harness.core.arrays import Floats
 from harness.simulate.components.soft_tissue import skin_below
 from harness.simulate.noise import Noise
 from harness.simulate.physical_readings import place_constellation
-from harness.simulate.physics.constellation import ConstellationSettings
+from harness.simulate.physics.constellation import ConstellationSettings, load_constellation
 from harness.simulate.physics.filter_settings import Fusion
+from harness.simulate.physics.free_motion import FACING_UP, FreeMotionSource
 from harness.simulate.physics.line_of_sight import LineOfSight
 from harness.simulate.physics.physical_tracker import PhysicalTracker, lead_in_s, lead_in_slots
 from harness.simulate.physics.ranging import Ranges
+from harness.simulate.physics.room import PlacedRoom
 from harness.simulate.physics.settings import Physics
 from harness.simulate.physics.station_displacement import BodyMotionSource, StationDisplacement
-from harness.simulate.simulation import exact_calibration
+from harness.simulate.simulation import WORLD_FROM_TRACKER, exact_calibration
 from harness.simulate.trajectory import Trajectory
 from tests.simulate.conftest import worn
 from tests.simulate.physical_takes import TRACKER, observed, performed, physical
@@ -98,3 +101,25 @@ def test_readings_at_common_times_do_not_depend_on_the_rate(rate_hz: int) -> Non
     slow, fast = (make_tracker().measure_take(np.repeat(at_s[:, None], 2, axis=1)) for at_s in (time_s, faster_s))
     np.testing.assert_allclose(fast.position_m[::step], slow.position_m, rtol=0.0, atol=1e-9)
     np.testing.assert_array_equal(fast.ranges_received[::step], slow.ranges_received)
+
+
+def known_microphones(session: str, take: str = "t", count: int = 200) -> Floats:
+    """(S, 2, 3) where the device assumes the microphones of stations at rest, from the station's origin [m]."""
+    physics, still = Physics(), np.zeros((2, count, 3))
+    turn = np.tile(FACING_UP, (2, count, 1))
+    names = [f"station {s}" for s in range(count)]
+    source = FreeMotionSource(names, np.array([0.0, 1.0]), still, turn, warm_up_s=lead_in_s(physics))
+    placed = PlacedRoom(physics.room, np.zeros(2), WORLD_FROM_TRACKER, np.array(TRACKER.origin_m))
+    constellation = load_constellation(physics.constellation)
+    tracker = PhysicalTracker(source, physics, constellation, placed, None, seed=1, take=take, session=session)
+    out: Floats = tracker.fusion.model.ranging.arm_m + np.array(physics.inertial.lever_m)
+    return out
+
+
+def test_the_device_misplaces_the_microphones_of_each_station_for_a_session() -> None:
+    off_m = known_microphones("day") - np.array(Physics().sound.microphones_m)
+    assert np.std(off_m, axis=0) == pytest.approx(np.full((2, 3), Physics().sound.microphone_sd_m), rel=0.2)
+    assert np.abs(np.mean(off_m, axis=0)).max() < 0.25 * Physics().sound.microphone_sd_m
+    assert np.array_equal(known_microphones("day", "another", 3), known_microphones("day", count=3))
+    assert np.array_equal(known_microphones("", "day", 3), known_microphones("day", count=3))
+    assert not np.isclose(known_microphones("night", count=3), known_microphones("day", count=3)).any()
