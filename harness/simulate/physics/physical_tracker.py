@@ -60,15 +60,7 @@ class PhysicalTracker:
             physics.sound, true, self.schedule, placed, sight, stations, seed=seed, take=take, session=session
         )
         self.unit = InertialUnit(inertial, stations, seed=seed, take=take, session=session)
-        self.fusion = FusionFilter(
-            physics.fusion,
-            physics.sound,
-            inertial,
-            constellation.position_m,
-            constellation.normal,
-            self.schedule,
-            stations,
-        )
+        self.fusion = FusionFilter(physics.fusion, physics.sound, inertial, constellation, self.schedule, stations)
         self._source, self._lever_m = source, np.array(inertial.lever_m)
         self._first_slot = -lead_in_slots(physics)
         self._with_body = sight is not None

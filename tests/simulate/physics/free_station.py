@@ -7,6 +7,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
+from harness.simulate.physics.constellation import Constellation
 from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.filter_state import Outputs
 from harness.simulate.physics.fusion import FusionFilter, empty_outputs
@@ -135,7 +136,9 @@ def new_filter(
     """A filter of some stations under the nine emitters."""
     names = [f"station {s}" for s in range(stations)]
     schedule = Schedule(TICK_HZ, len(EMITTER_M))
-    return FusionFilter(fusion, Sound(), inertial or Inertial(), emitter_m, NORMAL, schedule, names)
+    numbers = np.arange(len(emitter_m))
+    constellation = Constellation(numbers, emitter_m, NORMAL, numbers, np.deg2rad(70.0), 4.0)
+    return FusionFilter(fusion, Sound(), inertial or Inertial(), constellation, schedule, names)
 
 
 def records_every(ticks: int, slots: int, stations: int = 1, fraction: float = 0.0) -> Outputs:
