@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from harness.bench.physics import first_fix
 from harness.bench.physics.truth import SEEDS
 from harness.core.package_data import data_folder
 from harness.core.split import GUARD_S, ClipPart
@@ -82,6 +83,8 @@ def test_built_in_motion_was_not_made_like_the_clips_of_the_tables(name: str) ->
 def test_the_seeds_of_the_truth_table_chose_no_default_of_the_physics() -> None:
     (entry,) = (entry for entry in CONTENT["constant"] if entry["method"] == "physics of the simulated tracker")
     assert max(SEEDS) < entry["seeds_from"]
+    judged = range(first_fix.FIRST_START, first_fix.FIRST_START + first_fix.STARTS * len(SEEDS))
+    assert not set(judged) & set(range(entry["starts"][0], entry["starts"][1] + 1))
 
 
 def test_lengths_are_those_of_the_manifest() -> None:

@@ -245,7 +245,8 @@ def scaled_position_m(place_m: Floats, scale: float, physics: Physics) -> Floats
     heard = (distance_m <= constellation.range_m) & (cosine >= np.cos(constellation.cone_rad))
     noise = physics.fusion.range_noise_m, physics.fusion.range_scale, physics.fusion.survey_m
     emitters = constellation.position_m, constellation.normal
-    model = RangingModel(*emitters, np.zeros((1, 1, 3)), 1.0, physics.sound.absorption_db_per_m, *noise)
+    hearing = constellation.range_m, np.cos(constellation.cone_rad), -np.inf
+    model = RangingModel(*emitters, np.zeros((1, 1, 3)), 1.0, physics.sound.absorption_db_per_m, *noise, *hearing)
     rays = enumerate(zip(distance_m, ray_m / distance_m[:, None], strict=True))
     sigma_m = np.sqrt([range_variance(model, j, r, x, y, z, z) for j, (r, (x, y, z)) in rays])[heard]
     emitters_m, measured_m = constellation.position_m[heard], scale * distance_m[heard]

@@ -41,6 +41,8 @@ _BLOCKS = 1, 7, 80, 400
 """Sizes of a block whose bytes are compared [slots]."""
 MAX_TIME_RATIO, MAX_MEMORY_RATIO = 12.0, 1.3
 """Most time and peak memory, relative to the simulation with statistical errors."""
+MIN_SPEED_PERCENT = 10.0
+"""Least speed of six stations, as a share of that of bare kinematics [%]."""
 PHYSICAL = Noise(clock=Clock(), physics=Physics())
 
 
@@ -66,6 +68,9 @@ def bench_physics(seed: int = 1, repeats: int = 5) -> list[BenchmarkStatement]:
             hold_to_limit(name, SECONDS / physical_s, "x real time", reference=reference),
             hold_to_limit(f"{name}: time / that of statistical errors", ratio, "x", most=MAX_TIME_RATIO),
         ]
+        if count == len(common.MOUNTS):
+            share = 100.0 * kinematics_s / physical_s
+            rows.append(hold_to_limit(f"{name}: speed / that of bare kinematics", share, "%", least=MIN_SPEED_PERCENT))
     return [*rows, *_memory_rows(seed), _block_row(body, take, seed)]
 
 

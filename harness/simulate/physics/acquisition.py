@@ -2,17 +2,30 @@
 
 A lost station keeps its attitude by the gyroscopes, and gravity levels it slowly. Its specific force is integrated
 twice in that attitude, so the path between two ranges is known but for a velocity, a heading and a small tilt. A fix
-solves for them by Gauss-Newton, from four headings and from a place below the emitters. It leaves out a few ranges that
-do not fit. It is refused if the residuals stay large, if too few ranges remain, or if two different places fit as well.
+solves for them by Gauss-Newton, from the places of `trilateration` and four headings, first with the ranges that agree
+with a place, then with all that fit. It is refused if the residuals stay large, if too few ranges fit or several are
+early, if its emitters could not be heard, or if another place or heading fits as well.
 """
 
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.core.compiled import compiled
-from harness.core.compiled_rotations import quaternion_from_vector, quaternion_product, rotate, rotation_vector
+from harness.core.compiled_rotations import (
+    Vector,
+    quaternion_from_vector,
+    quaternion_product,
+    rotate,
+    rotation_vector,
+)
 from harness.simulate.physics.filter_state import AcquisitionState, RangingModel, range_variance
+from harness.simulate.physics.sound import level_db
 from harness.simulate.physics.strapdown import MOTION_ERRORS, STATE, attitude, set_attitude
+from harness.simulate.physics.trilateration import (
+    find_shortest,
+    guess_places,
+    latest_ranges,
+)
 from harness.simulate.readings import GRAVITY_M_S2
 
 RANGE_FIELDS = 12
@@ -20,23 +33,27 @@ RANGE_FIELDS = 12
 that unit [m] 5:8, the station's z axis 8:11, and the emitter's index 11."""
 LEAST_WINDOW_SLOTS, LONGEST_WINDOW_SLOTS = 40, 80
 """Limits of the window whose ranges make a fix: 0.5 s and 1 s at the default rate [choice]."""
-_LEAST_RANGES, _LEAST_EMITTERS = 10, 4
-"""Ranges and emitters of a fix, more than the nine unknowns and the three places need [choice]."""
+_LEAST_RANGES, _LEAST_EMITTERS = 10, 3
+"""Ranges and emitters of a fix, more than the nine unknowns need [choice]. Both microphones give the heading."""
 _LARGEST_RMS = 1.5
 """Root mean square of the residuals, in their standard deviations [choice]."""
 _LARGEST_RESIDUAL = 3.0
-"""Largest residual of a range that is kept, in its standard deviations [choice]."""
+"""Largest residual of a range that fits, in its standard deviations [choice]."""
 _OUTLIER_SHARE = 0.7
 """Ranges whose residuals exceed this share of the largest are left out together [choice]."""
-_INLIER_SHARE = 0.75
-"""Share of the ranges that a fix must keep [choice]."""
+_MOST_EARLY = 1
+"""Most early ranges of a fix [choice]."""
+_REFITS = 5
+"""Most fits of a guess, each to the ranges that fit the one before [choice]."""
+_GUESSES = 3
+"""Most places from which the search starts [choice]."""
+_BEYOND_M, _BEYOND_COS, _BEYOND_DB = 0.05, 0.01, 0.5
+"""Tolerances of a fix at the limits of the reach [m], of the cosine at the cone, and of the level [dB] [choice]."""
 _HEADINGS = 4
 _ITERATIONS = 15
 """Headings from which Gauss-Newton starts, and its most steps [choice]."""
 _SMALL_STEP = 1e-5
 """Length of a step that ends the search [m], [rad]."""
-_START_DISTANCE_M = 1.5
-"""Distance from the emitters at which it starts, on the side of their normals [choice]."""
 _SPEED_SIGMA_M_S, _LARGEST_SPEED_M_S = 5.0, 15.0
 """Standard deviation of the speed of a lost station, and the largest speed of a fix [choice]."""
 _DISTINCT_M, _DISTINCT_RAD = 0.05, 0.5
@@ -172,17 +189,29 @@ def normal_equations(
 
 
 @compiled
-def range_residual(model: RangingModel, row: Floats, motion: Floats, slope: Floats) -> tuple[float, float]:
-    """Residual [m] and variance [m^2] of a range (12,) at `motion` (10,); sets its `slope` (9,)."""
+def ray_to_microphone(model: RangingModel, row: Floats, motion: Floats) -> tuple[Vector, float, float, Vector]:
+    """Where the emitter and microphone of a range (12,) are for a station at `motion` (10,).
+
+    Returns direction and distance [m] from emitter to microphone, the cosine of the angle between the station's z axis
+    and the direction to the emitter, and the microphone from the inertial unit's present place [m].
+    """
     turn, since, emitter = attitude(motion), row[0], int(row[11])
-    ax, ay, az = rotate(turn, row[2] + row[5], row[3] + row[6], row[4] + row[7])
-    x = motion[0] + motion[3] * since + ax - model.emitter_m[emitter, 0]
-    y = motion[1] + motion[4] * since + ay - model.emitter_m[emitter, 1]
-    z = motion[2] + motion[5] * since + az + 0.5 * GRAVITY_M_S2 * since * since - model.emitter_m[emitter, 2]
+    arm = rotate(turn, row[2] + row[5], row[3] + row[6], row[4] + row[7])
+    x = motion[0] + motion[3] * since + arm[0] - model.emitter_m[emitter, 0]
+    y = motion[1] + motion[4] * since + arm[1] - model.emitter_m[emitter, 1]
+    z = motion[2] + motion[5] * since + arm[2] + 0.5 * GRAVITY_M_S2 * since * since - model.emitter_m[emitter, 2]
     distance = np.sqrt(x * x + y * y + z * z) + 1e-9
     x, y, z = x / distance, y / distance, z / distance
     zx, zy, zz = rotate(turn, row[8], row[9], row[10])
-    variance = range_variance(model, emitter, distance, x, y, z, -(zx * x + zy * y + zz * z))
+    return (x, y, z), distance, -(zx * x + zy * y + zz * z), arm
+
+
+@compiled
+def range_residual(model: RangingModel, row: Floats, motion: Floats, slope: Floats) -> tuple[float, float]:
+    """Residual [m] and variance [m^2] of a range (12,) at `motion` (10,); sets its `slope` (9,)."""
+    (x, y, z), distance, cos_station, (ax, ay, az) = ray_to_microphone(model, row, motion)
+    since = row[0]
+    variance = range_variance(model, int(row[11]), distance, x, y, z, cos_station)
     slope[0], slope[1], slope[2] = x, y, z
     slope[3], slope[4], slope[5] = since * x, since * y, since * z
     slope[6], slope[7], slope[8] = ay * z - az * y, az * x - ax * z, ax * y - ay * x
@@ -257,64 +286,76 @@ def gauss_newton(
 
 
 @compiled
-def reject_outliers(model: RangingModel, ranges: Floats, used: Bools, motion: Floats, most: int) -> int:
-    """Leave out the ranges that fit worst, at most some: those beyond the limit and near the largest; their number."""
-    slope, size = np.empty(MOTION_ERRORS), np.zeros(len(used))
+def select_inliers(
+    model: RangingModel, ranges: Floats, used: Bools, motion: Floats, inverse: Floats
+) -> tuple[int, int]:
+    """Use the ranges that fit `motion` (10,) and its covariance (9, 9); numbers of changes, and of early ranges.
+
+    While a range that is used lies far off, the fit is a bad one: only what lies almost as far off is then left out.
+    """
+    slope, size, limit = np.empty(MOTION_ERRORS), np.empty(len(used)), _LARGEST_RESIDUAL
     for i in range(len(used)):
+        residual, variance = range_residual(model, ranges[i], motion, slope)
+        for a in range(MOTION_ERRORS):
+            for b in range(MOTION_ERRORS):
+                variance += slope[a] * inverse[a, b] * slope[b]
+        size[i] = residual / np.sqrt(variance)
         if used[i]:
-            residual, variance = range_residual(model, ranges[i], motion, slope)
-            size[i] = abs(residual) / np.sqrt(variance)
-    limit = max(_LARGEST_RESIDUAL, _OUTLIER_SHARE * np.max(size))
-    dropped = 0
+            limit = max(limit, _OUTLIER_SHARE * abs(size[i]))
+    changes, early = 0, 0
     for i in range(len(used)):
-        if size[i] > limit and dropped < most:
-            used[i] = False
-            dropped += 1
-    return dropped
+        fits = abs(size[i]) < (limit if used[i] else _LARGEST_RESIDUAL)
+        changes += fits != used[i]
+        used[i] = fits
+        early += not fits and size[i] < 0.0
+    return changes, early
 
 
 @compiled
 def refit_inliers(
-    model: RangingModel,
-    ranges: Floats,
-    motion: Floats,
-    total: float,
-    converged: bool,
-    tilt_variance: float,
-    inverse: Floats,
+    model: RangingModel, ranges: Floats, used: Bools, motion: Floats, tilt_variance: float, inverse: Floats
 ) -> float:
-    """Leave out the few ranges that do not fit `motion` (10,), the minimum of all N, and fit again.
+    """Fit `motion` (10,) to the ranges used (N,), and again to all that fit it, until they stay the same.
 
-    `total` and `converged` are those of `gauss_newton`. Returns the sum of squared residuals, or infinity where the
-    fit is refused. Each range left out counts as much as one at the limit, so that sums compare. `inverse` (9, 9)
-    becomes the covariance.
+    Returns the sum of squared residuals, or infinity where the fit is refused. Each range left out counts as much as
+    one at the limit, so that sums compare. `inverse` (9, 9) becomes the covariance.
     """
-    used = np.ones(len(ranges), dtype=np.bool_)
-    left, least = len(ranges), max(_LEAST_RANGES, int(np.ceil(_INLIER_SHARE * len(ranges))))
-    while True:
-        dropped = reject_outliers(model, ranges, used, motion, left - least + 1)
-        left -= dropped
-        if left < least:
-            return np.inf
-        if dropped == 0:
-            break
+    for _ in range(_REFITS):
         total, converged = gauss_newton(model, ranges, used, motion, tilt_variance, inverse)
-        if not np.isfinite(total):
+        if not converged:
             return np.inf
+        changes, early = select_inliers(model, ranges, used, motion, inverse)
+        if changes == 0:
+            break
+    left = np.sum(used)
     if (
-        not converged
+        changes > 0
+        or early > _MOST_EARLY
+        or left < _LEAST_RANGES
         or total > _LARGEST_RMS**2 * (left - 7)
         or count_emitters(ranges, used, len(model.emitter_m)) < _LEAST_EMITTERS
     ):
         return np.inf
-    for i in range(len(ranges)):
-        j = int(ranges[i, 11])
-        side = 0.0
-        for k in range(3):
-            side += model.normal[j, k] * (motion[k] - model.emitter_m[j, k])
-        if used[i] and side <= 0.0:
-            return np.inf
     return total + _LARGEST_RESIDUAL**2 * (len(ranges) - left)
+
+
+@compiled
+def is_audible(model: RangingModel, ranges: Floats, used: Bools, motion: Floats) -> bool:
+    """Whether a station at `motion` (10,) could hear the emitters of all ranges used, by the law of `level_db`."""
+    for i in range(len(used)):
+        if not used[i]:
+            continue
+        j = int(ranges[i, 11])
+        (x, y, z), distance, cos_station = ray_to_microphone(model, ranges[i], motion)[:3]
+        cos_emitter = model.normal[j, 0] * x + model.normal[j, 1] * y + model.normal[j, 2] * z
+        level = level_db(distance, cos_emitter, cos_station, model.absorption_db_per_m)
+        if (
+            distance > model.reach_m + _BEYOND_M
+            or cos_emitter < model.cone_cos - _BEYOND_COS
+            or level < model.threshold_db - _BEYOND_DB
+        ):
+            return False
+    return True
 
 
 @compiled
@@ -336,44 +377,37 @@ def solve_position(
     """
     ranges = np.empty((acquisition.ranges.shape[1], RANGE_FIELDS))
     ranges = ranges[: collect_ranges(acquisition, s, window_s, ranges)]
-    everything = np.ones(len(ranges), dtype=np.bool_)
-    if len(ranges) < _LEAST_RANGES or count_emitters(ranges, everything, len(model.emitter_m)) < _LEAST_EMITTERS:
-        return False
-    best, best_inverse = np.zeros(STATE), np.empty((MOTION_ERRORS, MOTION_ERRORS))
-    least, next_least = np.inf, np.inf
-    minima, refined, totals = np.zeros((_HEADINGS, STATE)), np.zeros((_HEADINGS, STATE)), np.full(_HEADINGS, np.inf)
-    inverse = np.empty((MOTION_ERRORS, MOTION_ERRORS))
+    emitters = len(model.emitter_m)
+    shortest, latest = np.empty(len(ranges), dtype=np.bool_), np.empty((emitters, 2))
+    find_shortest(ranges, shortest)
+    latest_ranges(ranges, shortest, latest)
+    places, supports = np.empty((_GUESSES, 3)), np.empty((_GUESSES, emitters), dtype=np.bool_)
     tilt_variance = max(acquisition.tilt_variance[s], _LEAST_TILT_VARIANCE)
-    for heading in range(_HEADINGS):
-        trial = minima[heading]
-        for i in range(len(ranges)):
-            j = int(ranges[i, 11])
-            for k in range(3):
-                trial[k] += (model.emitter_m[j, k] + _START_DISTANCE_M * model.normal[j, k]) / len(ranges)
-        set_attitude(trial, quaternion_from_vector(0.0, 0.0, 2.0 * np.pi * heading / _HEADINGS))
-        total, converged = gauss_newton(model, ranges, everything, trial, tilt_variance, inverse)
-        fresh = np.isfinite(total)
-        for other in range(heading):
-            fresh = fresh and are_distinct(trial, minima[other])
-        if not fresh:
-            continue
-        refined[heading] = trial
-        totals[heading] = refit_inliers(model, ranges, refined[heading], total, converged, tilt_variance, inverse)
-        if totals[heading] < least:
-            least = totals[heading]
-            best[:] = refined[heading]
-            best_inverse[:] = inverse
-    if not np.isfinite(least):
+    trials, totals = np.zeros((_GUESSES * _HEADINGS, STATE)), np.full(_GUESSES * _HEADINGS, np.inf)
+    best_inverse, inverse = np.empty((MOTION_ERRORS, MOTION_ERRORS)), np.empty((MOTION_ERRORS, MOTION_ERRORS))
+    used, best, audible = np.empty(len(ranges), dtype=np.bool_), 0, False
+    for guess in range(guess_places(model, latest, places, supports)):
+        for heading in range(_HEADINGS):
+            k = guess * _HEADINGS + heading
+            for i in range(len(ranges)):
+                used[i] = shortest[i] and supports[guess, int(ranges[i, 11])]
+            trials[k, :3] = places[guess]
+            set_attitude(trials[k], quaternion_from_vector(0.0, 0.0, 2.0 * np.pi * heading / _HEADINGS))
+            totals[k] = refit_inliers(model, ranges, used, trials[k], tilt_variance, inverse)
+            if totals[k] < totals[best] or k == 0:
+                best = k
+                best_inverse[:] = inverse
+                audible = np.isfinite(totals[k]) and is_audible(model, ranges, used, trials[k])
+    if not audible:
         return False
-    for heading in range(_HEADINGS):
-        if np.isfinite(totals[heading]) and are_distinct(best, refined[heading]):
-            next_least = min(next_least, totals[heading])
-    speed = np.sqrt(best[3] ** 2 + best[4] ** 2 + best[5] ** 2)
-    if next_least < least + _AMBIGUITY_MARGIN or speed > _LARGEST_SPEED_M_S:
+    for k in range(len(trials)):
+        if totals[k] < totals[best] + _AMBIGUITY_MARGIN and are_distinct(trials[best], trials[k]):
+            return False
+    found = trials[best]
+    if np.sqrt(found[3] ** 2 + found[4] ** 2 + found[5] ** 2) > _LARGEST_SPEED_M_S:
         return False
-    turn = attitude(best)
-    for k in range(6):
-        motion[k] = best[k]
+    turn = attitude(found)
+    motion[:6] = found[:6]
     set_attitude(motion, quaternion_product(turn, attitude(motion)))
     covariance[:MOTION_ERRORS, :] = 0.0
     covariance[:, :MOTION_ERRORS] = 0.0

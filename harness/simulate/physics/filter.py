@@ -202,7 +202,7 @@ def update_slot(
     vectors = work.vectors
     error, slope, column, rest = vectors[0], vectors[1], vectors[2], vectors[3]
     error[:] = 0.0
-    received, rejected = 0, 0
+    received, rejected, late = 0, 0, 0
     at = np.empty(9)
     for m in range(len(range_m)):
         if np.isnan(range_m[m]):
@@ -226,27 +226,30 @@ def update_slot(
         total = project(covariance, slope, column) + noise
         if innovation * innovation > model.gate * model.gate * total:
             rejected += 1
+            late += innovation > 0.0
             continue
+        state.accepted[s, emitter] = slot
         state.nis[s, 0] += innovation * innovation / total
         state.nis[s, 1] += 1.0
         for i in range(ERRORS):
             error[i] += column[i] * (innovation / total)
         joseph_update(covariance, slope, column, total, noise, rest)
-    count_ranges(state, s, slot, received, rejected)
+    count_ranges(state, s, slot, received, rejected, late)
     if received > rejected:
         apply_error_state(model, state, s, error)
 
 
 @compiled
-def count_ranges(state: FilterState, s: int, slot: int, received: int, rejected: int) -> None:
-    """Enter the ranges of a slot."""
+def count_ranges(state: FilterState, s: int, slot: int, received: int, rejected: int, late: int) -> None:
+    """Enter the ranges of a slot; late ones are among the rejected."""
     place = slot % state.counts.shape[2]
     state.counts[0, s, place] = received
     state.counts[1, s, place] = rejected
+    state.counts[2, s, place] = late
     status = state.status[s]
     status[2] = 0 if received > rejected else status[2] + 1
     status[3] += received - rejected
-    status[4] += rejected
+    status[4] += rejected - late
 
 
 @compiled
@@ -287,7 +290,7 @@ def acquire_slot(
             row[2 + k] = path[k] - path[3 + k] * remaining_s + 0.5 * force[k] * remaining_s * remaining_s
         row[5:11] = at[3:9]
         acquisition.range_count[s] += 1
-    count_ranges(state, s, slot, received, 0)
+    count_ranges(state, s, slot, received, 0, 0)
     level_attitude(acquisition, s, motion[TICKS_PER_SLOT], force[0], force[1], force[2], slot_s)
     covariance = state.covariance[s]
     drift = covariance[9, 9] + covariance[10, 10] + covariance[11, 11]

@@ -50,7 +50,8 @@ class Fusion(CheckedFields):
     sigma_limit_m: Annotated[float, Range(1e-3, 10.0)] = 0.03
     """Standard deviation of the position beyond which the station is suspect and has quality 0 [m] [choice]."""
     reject_share: Annotated[float, Range(0.0, 1.0)] = 0.6
-    """Share of rejected ranges in a second beyond which the station is lost [choice]."""
+    """Share of rejected ranges in a second beyond which the station is lost; late ones do not count while the others
+    fit [choice]."""
     coast_s: Annotated[float, Range(0.05, 60.0)] = 1.5
     """Longest time without an accepted range before the station is lost [s] [choice]."""
     quality_sigma_m: Annotated[float, Range(1e-5, 1.0)] = 0.003

@@ -25,6 +25,12 @@ class RangingModel(NamedTuple):
     """Standard deviation of the scale of a range."""
     survey_m: float
     """Standard deviation of an emitter's position."""
+    reach_m: float
+    """Largest distance from emitter to microphone."""
+    cone_cos: float
+    """Least cosine of the angle between an emitter's normal and its sound."""
+    threshold_db: float
+    """Lowest level that is heard."""
 
 
 class FilterModel(NamedTuple):
@@ -86,10 +92,12 @@ class FilterState(NamedTuple):
     """(S, 2, 6) offsets of enhancement modes 1 and 2."""
     status: Ints
     """(S, 6) LOST, TENTATIVE, TRACKING or SUSPECT; whether the position is frozen; slots since an accepted range;
-    accepted and rejected ranges since the fix, or since it became suspect; slots since then, or since the last
+    accepted and early ranges since the fix, or since it became suspect; slots since then, or since the last
     attempt of a fix."""
     counts: Ints
-    """(2, S, slots of a second) ranges received and rejected, in a ring."""
+    """(3, S, slots of a second) ranges received, rejected, and rejected because they are late, in a ring."""
+    accepted: Ints
+    """(S, J) slot of the last accepted range of each emitter."""
     report: Floats
     """(S, 4) quality, standard deviation of the position [m], ranges received and rejected in the last cycle."""
     nis: Floats

@@ -4,6 +4,7 @@ The filter sees what a device would: increments of angle and velocity, ranges, a
 from a fix, never from the truth.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,13 +17,14 @@ from harness.simulate.physics.acquisition import (
     LONGEST_WINDOW_SLOTS,
     RANGE_FIELDS,
 )
+from harness.simulate.physics.constellation import Constellation
 from harness.simulate.physics.filter import filter_stations
 from harness.simulate.physics.filter_record import MODES
 from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.filter_state import AcquisitionState, FilterModel, FilterState, Outputs, RangingModel
 from harness.simulate.physics.inertial import Inertial
 from harness.simulate.physics.schedule import TICKS_PER_SLOT, Schedule
-from harness.simulate.physics.sound import MICROPHONES, Sound, speed_of_sound_m_s
+from harness.simulate.physics.sound import MICROPHONES, Sound, speed_of_sound_m_s, threshold_db
 from harness.simulate.physics.strapdown import ERRORS, STATE
 from harness.simulate.physics.tracking_status import CONFIRMATION_SLOTS, freeze_position, set_bias_covariance
 
@@ -38,14 +40,13 @@ class FusionFilter:
         fusion: Fusion,
         sound: Sound,
         inertial: Inertial,
-        emitter_m: Floats,
-        normal: Floats,
+        constellation: Constellation,
         microphone_m: Floats,
         schedule: Schedule,
         stations: Sequence[str],
     ) -> None:
-        """What the device knows: emitters (J, 3) [m] and their unit normals (J, 3) in the tracker's frame, and the
-        microphones (S, 2, 3) of each station in its axes [m].
+        """What the device knows: the constellation in the tracker's frame, and the microphones (S, 2, 3) of each
+        station in its axes [m].
         """
         lever = np.array(inertial.lever_m)
         slot_s, turn = schedule.slot_s, schedule.turn_slots
@@ -53,14 +54,17 @@ class FusionFilter:
         second = max(round(1.0 / slot_s), 1)
         self.stations = tuple(stations)
         ranging = RangingModel(
-            np.array(emitter_m, dtype=float),
-            np.array(normal, dtype=float),
+            np.array(constellation.position_m),
+            np.array(constellation.normal),
             np.array(microphone_m) - lever,
             speed_of_sound_m_s(sound.assumed_c),
             sound.absorption_db_per_m,
             fusion.range_noise_m,
             fusion.range_scale,
             fusion.survey_m,
+            constellation.range_m,
+            math.cos(constellation.cone_rad),
+            threshold_db(constellation.range_m, constellation.cone_rad, sound.absorption_db_per_m),
         )
         sensors, models = (inertial.gyroscope, inertial.accelerometer), (fusion.gyroscope, fusion.accelerometer)
         self.model = FilterModel(
@@ -80,7 +84,9 @@ class FusionFilter:
             window_s=(window + 0.5) * slot_s,
             best_sigma_m=fusion.quality_sigma_m,
         )
-        self.state = _initial_state(len(self.stations), max(second, LEAST_WINDOW_SLOTS), MICROPHONES * (window + 1))
+        self.state = _initial_state(
+            len(self.stations), len(constellation), max(second, LEAST_WINDOW_SLOTS), MICROPHONES * (window + 1)
+        )
         for s in range(len(self.stations)):
             set_bias_covariance(self.model, self.state.covariance[s])
             freeze_position(self.state, s)
@@ -126,7 +132,7 @@ def empty_outputs(tick: Ints, fraction: Floats) -> Outputs:
     )
 
 
-def _initial_state(stations: int, slots: int, ranges: int) -> FilterState:
+def _initial_state(stations: int, emitters: int, slots: int, ranges: int) -> FilterState:
     motion = np.zeros((stations, TICKS_PER_SLOT + 1, STATE))
     motion[:, :, 6] = 1.0
     return FilterState(
@@ -137,7 +143,8 @@ def _initial_state(stations: int, slots: int, ranges: int) -> FilterState:
         acceleration_m_s2=np.zeros((stations, 3)),
         offset=np.zeros((stations, MODES - 1, 6)),
         status=np.zeros((stations, 6), dtype=np.int64),
-        counts=np.zeros((2, stations, slots), dtype=np.int64),
+        counts=np.zeros((3, stations, slots), dtype=np.int64),
+        accepted=np.full((stations, emitters), -(2**62)),
         report=np.zeros((stations, 4)),
         nis=np.zeros((stations, 2)),
         acquisition=AcquisitionState(

@@ -64,14 +64,7 @@ class PhysicalTracker:
         microphone_m = np.array([rng.normal(sound.microphones_m, sound.microphone_sd_m) for rng in rngs])
         self.unit = InertialUnit(inertial, stations, seed=seed, take=take, session=session)
         self.fusion = FusionFilter(
-            physics.fusion,
-            sound,
-            inertial,
-            constellation.position_m,
-            constellation.normal,
-            microphone_m,
-            self.schedule,
-            stations,
+            physics.fusion, sound, inertial, constellation, microphone_m, self.schedule, stations
         )
         self._source, self._lever_m = source, np.array(inertial.lever_m)
         self._first_slot = -lead_in_slots(physics)

@@ -1,5 +1,7 @@
 """The status of a station: lost, tentative, tracking or suspect, and what its records report (docs/is900.md 16.7)."""
 
+import numpy as np
+
 from harness.core.arrays import Floats, Ints
 from harness.core.compiled import compiled
 from harness.simulate.physics.filter_state import AcquisitionState, FilterModel, FilterState
@@ -8,8 +10,10 @@ from harness.simulate.physics.strapdown import MOTION_ERRORS, attitude_sigma_rad
 
 CONFIRMATION_RANGES, CONFIRMATION_SLOTS = 6, 12
 """Accepted ranges that confirm a fix, and the slots that it takes at least [choice]."""
+_CONFIRMATION_EMITTERS = 4
+"""Emitters whose ranges confirm one: three can agree with a wrong place [choice]."""
 _LARGEST_REJECT_SHARE = 0.3
-"""Share of rejected ranges that refutes one [choice]."""
+"""Share of early ranges, among those that are not late, that refutes one [choice]."""
 _LARGEST_ATTITUDE_SIGMA_RAD = 0.1
 """Largest standard deviation of the attitude of a confirmed fix [rad] [choice]."""
 _LARGEST_NIS = 2.0
@@ -38,8 +42,9 @@ def update_status(model: FilterModel, state: FilterState, s: int, slot: int) -> 
     sigma = position_sigma_m(covariance)
     status[5] += 1
     if status[0] == TRACKING:
-        received = sum_window(counts[0, s], slot, model.reject_slots)
-        rejected = sum_window(counts[1, s], slot, model.reject_slots)
+        late = sum_window(counts[2, s], slot, model.reject_slots) if has_small_nis(state, s) else 0
+        received = sum_window(counts[0, s], slot, model.reject_slots) - late
+        rejected = sum_window(counts[1, s], slot, model.reject_slots) - late
         if received >= _FEWEST_RANGES and rejected > model.reject_share * received:
             reset_station(model, state, s)
         elif status[2] > model.coast_slots:
@@ -56,11 +61,12 @@ def update_status(model: FilterModel, state: FilterState, s: int, slot: int) -> 
             mark_lost(state, s, LOST_TILT_VARIANCE)
         elif (
             status[3] >= CONFIRMATION_RANGES
+            and np.sum(state.accepted[s] > slot - status[5]) >= _CONFIRMATION_EMITTERS
             and status[5] >= (CONFIRMATION_SLOTS if suspect else model.confirmation_slots)
             and sigma < model.sigma_limit_m
             and attitude_sigma_rad(covariance) < _LARGEST_ATTITUDE_SIGMA_RAD
         ):
-            if state.nis[s, 0] < _LARGEST_NIS * state.nis[s, 1]:
+            if has_small_nis(state, s):
                 status[0] = TRACKING
             else:
                 reset_station(model, state, s)
@@ -71,6 +77,12 @@ def update_status(model: FilterModel, state: FilterState, s: int, slot: int) -> 
     report = state.report[s]
     report[0] = tracking_quality(status[0], sigma, received, rejected, model.best_sigma_m)
     report[1], report[2], report[3] = sigma, received, rejected
+
+
+@compiled
+def has_small_nis(state: FilterState, s: int) -> bool:
+    """Whether the ranges accepted since the fix fit, so that late ones may be taken for echoes."""
+    return bool(state.nis[s, 0] < _LARGEST_NIS * state.nis[s, 1])
 
 
 @compiled

@@ -7,6 +7,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
+from harness.simulate.physics.constellation import Constellation
 from harness.simulate.physics.filter_settings import Fusion, SensorModel
 from harness.simulate.physics.filter_state import Outputs
 from harness.simulate.physics.fusion import FusionFilter, empty_outputs
@@ -149,8 +150,10 @@ def new_filter(
     """A filter of some stations under the nine emitters."""
     names = [f"station {s}" for s in range(stations)]
     schedule = Schedule(TICK_HZ, len(EMITTER_M))
+    numbers = np.arange(len(emitter_m))
+    constellation = Constellation(numbers, emitter_m, NORMAL, numbers, np.deg2rad(70.0), 4.0)
     microphone_m = np.tile(Sound().microphones_m, (stations, 1, 1))
-    return FusionFilter(fusion, Sound(), inertial or Inertial(), emitter_m, NORMAL, microphone_m, schedule, names)
+    return FusionFilter(fusion, Sound(), inertial or Inertial(), constellation, microphone_m, schedule, names)
 
 
 def records_every(ticks: int, slots: int, stations: int = 1, fraction: float = 0.0) -> Outputs:

@@ -1,5 +1,7 @@
 """The fix and the level of a lost station."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from harness.simulate.physics.inertial import Inertial
 from harness.simulate.physics.tracking_status import reset_acquisition
 from harness.simulate.readings import GRAVITY_M_S2
 from tests.simulate.physics.free_station import (
+    EMITTER_M,
     FreeStation,
     exact_inertial,
     free_station,
@@ -73,19 +76,51 @@ def test_a_fix_is_refused_when_most_ranges_are_wrong(rng: np.random.Generator) -
     assert not try_fix(searching(station))[0]
 
 
-def test_a_fix_needs_four_emitters() -> None:
+@pytest.mark.parametrize(("heard", "expected"), [((0, 1, 4), True), ((0, 4), False), ((0, 1, 2), False)])
+def test_a_fix_needs_three_emitters_that_are_not_in_a_row(heard: tuple[int, ...], expected: bool) -> None:
     station, _ = noisy(free_station(2.0, 1), 1, Inertial())
     emitter = np.arange(len(station.range_m)) % 9
-    station.range_m[emitter > 2] = np.nan
-    assert not try_fix(searching(station))[0]
+    station.range_m[~np.isin(emitter, heard)] = np.nan
+    found, motion, _ = try_fix(searching(station))
+    assert found == expected
+    assert not found or np.linalg.norm(motion[:3] - station.unit_position_m[5 * SLOTS]) < 0.1
+
+
+@pytest.mark.parametrize("late", [3, 5])
+def test_a_fix_stands_although_most_ranges_are_echoes(late: int) -> None:
+    """As if a floor reflected the sound of some emitters: their ranges agree with a place below it."""
     station, _ = noisy(free_station(2.0, 1), 1, Inertial())
-    station.range_m[(emitter == 1) | (emitter > 4)] = np.nan
-    assert try_fix(searching(station))[0]
+    emitter = np.arange(len(station.range_m)) % 9
+    mirrored = station.unit_position_m[::5][: len(emitter)] * [1.0, 1.0, -1.0] + [0.0, 0.0, 1.0]
+    longer = np.linalg.norm(mirrored - EMITTER_M[emitter], axis=1)
+    echoes = emitter >= 9 - late
+    station.range_m[echoes] = longer[echoes, None]
+    found, motion, _ = try_fix(searching(station))
+    assert found
+    assert np.linalg.norm(motion[:3] - station.unit_position_m[5 * SLOTS]) < 0.05
+
+
+def test_a_fix_is_refused_where_several_ranges_are_early() -> None:
+    station, _ = noisy(free_station(2.0, 1), 1, Inertial())
+    station.range_m[[5, 17, 30]] -= 0.2
+    assert not try_fix(searching(station))[0]
+
+
+@pytest.mark.parametrize(
+    ("limits", "expected"),
+    [({}, True), ({"reach_m": 1.4}, False), ({"cone_cos": 0.9}, False), ({"threshold_db": -6.0}, False)],
+)
+def test_a_fix_is_refused_where_its_emitters_are_not_heard(limits: dict[str, Any], expected: bool) -> None:
+    station, _ = noisy(free_station(2.0, 1), 1, Inertial())
+    fusion_filter = searching(station)
+    ranging = fusion_filter.model.ranging._replace(**limits)
+    fusion_filter.model = fusion_filter.model._replace(ranging=ranging)
+    assert try_fix(fusion_filter)[0] == expected
 
 
 def test_a_fix_uses_the_window_only() -> None:
     station, _ = noisy(free_station(2.0, 1), 1, Inertial())
-    station.range_m[:20] += 0.7
+    station.range_m[:20] -= 0.7
     fusion_filter = searching(station)
     assert not try_fix(fusion_filter)[0]
     assert try_fix(fusion_filter, window_s=0.25)[0]

@@ -8,6 +8,7 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.errors import ShapeError
+from harness.simulate.physics.constellation import Constellation
 from harness.simulate.physics.filter_settings import Fusion
 from harness.simulate.physics.filter_state import Outputs
 from harness.simulate.physics.fusion import FusionFilter
@@ -166,15 +167,28 @@ def test_a_lost_station_coasts_and_then_stays() -> None:
     assert np.isfinite(outputs.tracker_from_station).all()
 
 
-def test_persistent_rejections_lose_the_station() -> None:
+@pytest.mark.parametrize(("later_m", "lost"), [(-0.4, True), (0.4, False)])
+def test_early_ranges_refute_a_fix_and_late_ones_do_not(later_m: float, lost: bool) -> None:
     station = free_station(8.0, 2)
     measured, _ = noisy(station, 2, Inertial())
     heard = measured.range_m.copy()
-    heard[4 * SLOTS_PER_S :, :] += np.where(np.arange(4 * SLOTS_PER_S) % 9 < 7, 0.4, 0.0)[:, None]
+    heard[4 * SLOTS_PER_S :, :] += np.where(np.arange(4 * SLOTS_PER_S) % 9 < 6, later_m, 0.0)[:, None]
     outputs = run(new_filter(fusion=Fusion()), replace(measured, range_m=heard))
     second = outputs.tick[:, 0] / TICK_HZ
     assert (quality(outputs)[(second > 2.0) & (second < 4.0)] > 0.0).all()
-    assert not quality(outputs)[(second > 5.0)].any()
+    known = quality(outputs)[(second > 5.0) & (second < 6.0)] > 0.0
+    assert not known.any() if lost else known.all()
+    assert errors_m(outputs, station)[quality(outputs) > 0.0].max() < 0.05
+    assert (outputs.report[second > 5.0, 0, 3].max() > 0) or lost  # late ranges count as rejected in the records
+
+
+def test_a_fix_is_confirmed_by_four_emitters() -> None:
+    measured, _ = noisy(free_station(6.0, 3, speed=0.0), 3, Inertial())
+    emitter = np.arange(len(measured.range_m)) % 9
+    for heard, confirmed in (((0, 1, 4), False), ((0, 1, 4, 5), True)):
+        some = np.where(np.isin(emitter, heard)[:, None], measured.range_m, np.nan)
+        outputs = run(new_filter(fusion=Fusion()), replace(measured, range_m=some))
+        assert (quality(outputs) > 0.0).any() == confirmed
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -202,15 +216,12 @@ def test_the_spread_at_rest_is_the_published_one() -> None:
 
 
 def test_windows_do_not_grow_with_emitters_that_do_not_fire() -> None:
-    models = [
-        FusionFilter(
-            *(Fusion(), Sound(), Inertial(), np.zeros((count, 3)), np.tile([0.0, 0.0, 1.0], (count, 1))),
-            np.zeros((1, 2, 3)),
-            Schedule(TICK_HZ, count),
-            ["a"],
-        ).model
-        for count in (NEAR_EMITTERS, 4 * NEAR_EMITTERS)
-    ]
+    models = []
+    for count in (NEAR_EMITTERS, 4 * NEAR_EMITTERS):
+        numbers, normal = np.arange(count), np.tile([0.0, 0.0, 1.0], (count, 1))
+        constellation = Constellation(numbers, np.zeros((count, 3)), normal, numbers, 1.2, 4.0)
+        device = constellation, np.zeros((1, 2, 3)), Schedule(TICK_HZ, count), ["a"]
+        models.append(FusionFilter(Fusion(), Sound(), Inertial(), *device).model)
     assert models[0].window_s == models[1].window_s
     assert models[0].confirmation_slots == models[1].confirmation_slots
 
