@@ -236,8 +236,9 @@ def _excursions(errors: StationErrors) -> list[float]:
 
 
 def _spread_m(errors: StationErrors) -> float:
-    """Standard deviation of the 3-D position of tracked records [m]."""
-    return float(np.sqrt(np.sum(np.var(errors.error_m[errors.quality > 0.0], axis=0))))
+    """Standard deviation of the 3-D position of tracked records [m]; NaN without any."""
+    tracked = errors.error_m[errors.quality > 0.0]
+    return float(np.sqrt(np.sum(np.var(tracked, axis=0)))) if len(tracked) else float("nan")
 
 
 def _mean_error(errors: StationErrors) -> Floats:

@@ -22,6 +22,7 @@ from harness.simulate.physics.filter_state import AcquisitionState, RangingModel
 from harness.simulate.physics.sound import level_db
 from harness.simulate.physics.strapdown import MOTION_ERRORS, STATE, attitude, set_attitude
 from harness.simulate.physics.trilateration import (
+    EmitterCones,
     find_shortest,
     guess_places,
     latest_ranges,
@@ -386,7 +387,8 @@ def solve_position(
     trials, totals = np.zeros((_GUESSES * _HEADINGS, STATE)), np.full(_GUESSES * _HEADINGS, np.inf)
     best_inverse, inverse = np.empty((MOTION_ERRORS, MOTION_ERRORS)), np.empty((MOTION_ERRORS, MOTION_ERRORS))
     used, best, audible = np.empty(len(ranges), dtype=np.bool_), 0, False
-    for guess in range(guess_places(model, latest, places, supports)):
+    cones = EmitterCones(model.emitter_m, model.normal, model.reach_m, model.cone_cos)
+    for guess in range(guess_places(cones, latest, places, supports)):
         for heading in range(_HEADINGS):
             k = guess * _HEADINGS + heading
             for i in range(len(ranges)):

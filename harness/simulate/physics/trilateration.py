@@ -5,11 +5,12 @@ shortest ones, and a station cannot be where the range of any emitter would be e
 trilateration. The guesses are those places that most emitters agree with.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.core.compiled import compiled
-from harness.simulate.physics.filter_state import RangingModel
 
 _COMPANION_M = 0.3
 """Largest difference of two ranges of an emitter that support one another [m] [choice]."""
@@ -25,6 +26,19 @@ _SPEED_M_S = 4.0
 """Speed of a station: it adds to both errors for the age of a range [m/s] [choice]."""
 _BEYOND_M, _BEYOND_COS = 0.1, 0.05
 """Tolerances at the limits of the reach [m] and of the cosine at the cone [choice]."""
+
+
+class EmitterCones(NamedTuple):
+    """Where J emitters are, and where they are heard."""
+
+    position_m: Floats
+    """(J, 3) positions."""
+    normal: Floats
+    """(J, 3) unit vectors along which they send."""
+    reach_m: float
+    """Largest distance to a microphone."""
+    cone_cos: float
+    """Least cosine of the angle between normal and sound."""
 
 
 @compiled
@@ -93,7 +107,7 @@ def trilaterate(first: Floats, second: Floats, third: Floats, range_m: Floats, p
 
 
 @compiled
-def supporting_emitters(model: RangingModel, latest: Floats, place: Floats, support: Bools) -> int:
+def supporting_emitters(cones: EmitterCones, latest: Floats, place: Floats, support: Bools) -> int:
     """Flag the emitters (J,) that agree with a place (3,); their number, 0 if one is early or could not be heard."""
     count = 0
     for j in range(len(latest)):
@@ -102,14 +116,14 @@ def supporting_emitters(model: RangingModel, latest: Floats, place: Floats, supp
             continue
         distance, depth = 0.0, 0.0
         for k in range(3):
-            distance += (place[k] - model.emitter_m[j, k]) ** 2
-            depth += (place[k] - model.emitter_m[j, k]) * model.normal[j, k]
+            distance += (place[k] - cones.position_m[j, k]) ** 2
+            depth += (place[k] - cones.position_m[j, k]) * cones.normal[j, k]
         distance = np.sqrt(distance)
         late, moved = latest[j, 0] - distance, _SPEED_M_S * latest[j, 1]
         if late < -_EARLY_M - moved:
             return 0
         if late < _AGREEMENT_M + moved:
-            if distance > model.reach_m + _BEYOND_M or depth < (model.cone_cos - _BEYOND_COS) * distance:
+            if distance > cones.reach_m + _BEYOND_M or depth < (cones.cone_cos - _BEYOND_COS) * distance:
                 return 0
             support[j] = True
             count += 1
@@ -117,7 +131,7 @@ def supporting_emitters(model: RangingModel, latest: Floats, place: Floats, supp
 
 
 @compiled
-def guess_places(model: RangingModel, latest: Floats, places: Floats, supports: Bools) -> int:
+def guess_places(cones: EmitterCones, latest: Floats, places: Floats, supports: Bools) -> int:
     """Set the places (K, 3) that most emitters agree with, and these emitters (K, J); the number of places.
 
     A place is left out if an earlier one agrees with the three emitters that it comes from.
@@ -135,11 +149,11 @@ def guess_places(model: RangingModel, latest: Floats, places: Floats, supports: 
                 if known:
                     continue
                 range_m[0], range_m[1], range_m[2] = latest[first, 0], latest[second, 0], latest[third, 0]
-                emitters = model.emitter_m
+                emitters = cones.position_m
                 if not trilaterate(emitters[first], emitters[second], emitters[third], range_m, both):
                     continue
                 for side in range(2):
-                    count = supporting_emitters(model, latest, both[side], support)
+                    count = supporting_emitters(cones, latest, both[side], support)
                     if count < 3 or not (support[first] and support[second] and support[third]):
                         continue
                     k = found if found < len(places) else int(np.argmin(counts))

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Bools, Floats
-from harness.simulate.physics.filter_state import RangingModel
-from harness.simulate.physics.trilateration import find_shortest, guess_places, latest_ranges, trilaterate
+from harness.simulate.physics.trilateration import EmitterCones, find_shortest, guess_places, latest_ranges, trilaterate
 from tests.simulate.physics.free_station import EMITTER_M, NORMAL
 
-MODEL = RangingModel(EMITTER_M, NORMAL, np.zeros((2, 3)), 343.0, 1.3, 0.002, 0.0, 0.0, 4.0, 0.342, -25.0)
+CONES = EmitterCones(EMITTER_M, NORMAL, 4.0, 0.342)
 PLACE: Floats = np.array([0.3, -0.2, -1.1])
 
 
@@ -28,7 +27,7 @@ def shortest_of(ranges: Floats) -> Bools:
 
 def guess(latest_m: Floats, age_s: Floats, count: int = 3) -> tuple[Floats, list[list[int]]]:
     places, supports = np.zeros((count, 3)), np.zeros((count, len(latest_m)), dtype=bool)
-    found = guess_places(MODEL, np.stack([latest_m, age_s], axis=1), places, supports)
+    found = guess_places(CONES, np.stack([latest_m, age_s], axis=1), places, supports)
     return places[:found], [np.nonzero(support)[0].tolist() for support in supports[:found]]
 
 
@@ -75,7 +74,7 @@ def test_an_old_range_of_a_station_that_moves_does_not_refute_a_place() -> None:
 def test_a_place_out_of_reach_is_no_guess() -> None:
     far = np.array([0.0, 0.0, 1.7])
     latest_m = np.linalg.norm(EMITTER_M - far, axis=1)
-    assert latest_m.min() > MODEL.reach_m + 0.1
+    assert latest_m.min() > CONES.reach_m + 0.1
     assert not len(guess(latest_m, np.zeros(9))[0])
     aside = np.array([3.0, 0.0, -2.0])
     assert not len(guess(np.linalg.norm(EMITTER_M - aside, axis=1), np.zeros(9))[0])
