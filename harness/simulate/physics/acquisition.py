@@ -318,19 +318,21 @@ def refit_inliers(
 ) -> float:
     """Fit `motion` (10,) to the ranges used (N,), and again to all that fit it, until they stay the same.
 
+    Late ranges that lie near a guess, as those over the floor of a station near it do, keep a fit from converging.
     Returns the sum of squared residuals, or infinity where the fit is refused. Each range left out counts as much as
     one at the limit, so that sums compare. `inverse` (9, 9) becomes the covariance.
     """
     for _ in range(_REFITS):
         total, converged = gauss_newton(model, ranges, used, motion, tilt_variance, inverse)
-        if not converged:
+        if not np.isfinite(total):
             return np.inf
         changes, early = select_inliers(model, ranges, used, motion, inverse)
         if changes == 0:
             break
     left = np.sum(used)
     if (
-        changes > 0
+        not converged
+        or changes > 0
         or early > _MOST_EARLY
         or left < _LEAST_RANGES
         or total > _LARGEST_RMS**2 * (left - 7)

@@ -11,7 +11,7 @@ from harness.simulate.physics.strapdown import MOTION_ERRORS, attitude_sigma_rad
 CONFIRMATION_RANGES, CONFIRMATION_SLOTS = 6, 12
 """Accepted ranges that confirm a fix, and the slots that it takes at least [choice]."""
 _CONFIRMATION_EMITTERS = 4
-"""Emitters whose ranges confirm one: three can agree with a wrong place [choice]."""
+"""Emitters whose ranges confirm a new one: three can agree with a wrong place [choice]. A suspect station had them."""
 _LARGEST_REJECT_SHARE = 0.3
 """Share of early ranges, among those that are not late, that refutes one [choice]."""
 _LARGEST_ATTITUDE_SIGMA_RAD = 0.1
@@ -61,7 +61,7 @@ def update_status(model: FilterModel, state: FilterState, s: int, slot: int) -> 
             mark_lost(state, s, LOST_TILT_VARIANCE)
         elif (
             status[3] >= CONFIRMATION_RANGES
-            and np.sum(state.accepted[s] > slot - status[5]) >= _CONFIRMATION_EMITTERS
+            and (suspect or np.sum(state.accepted[s] > slot - status[5]) >= _CONFIRMATION_EMITTERS)
             and status[5] >= (CONFIRMATION_SLOTS if suspect else model.confirmation_slots)
             and sigma < model.sigma_limit_m
             and attitude_sigma_rad(covariance) < _LARGEST_ATTITUDE_SIGMA_RAD
