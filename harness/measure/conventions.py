@@ -29,6 +29,10 @@ UNITS_M = {
     "micrometres": 1e-6, "millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "decimetres": 0.1, "feet": 0.3048,
     "kilometres": 1e3,
 }  # fmt: skip
+_CONFUSIONS = {f"{unit} instead of metres": metres for unit, metres in UNITS_M.items()} | {
+    "inches instead of centimetres": 2.54
+}
+"""Unit of a file instead of the one in which it was read -> ratio of both."""
 _MIRRORED_GAIN = 4.0
 """Factor by which a mirrored fit must leave less than an unmirrored one to be believed [choice]."""
 _LEFT_HANDED = "The reference's axes are left-handed (Unity exports such), or one axis of its file is negated."
@@ -68,11 +72,11 @@ def require_scale(factor: float) -> None:
             f"Positions of the capture are {factor:.4g} times those of the reference.",
             f"Likely cause: positions or quaternions of the reference are of left-handed axes. {_TO_RIGHT_HANDED}",
         )
-    units = {("reference", unit): metres for unit, metres in UNITS_M.items()}
-    units |= {("capture", unit): 1.0 / metres for unit, metres in UNITS_M.items()}
+    units = {("reference", unit): ratio for unit, ratio in _CONFUSIONS.items()}
+    units |= {("capture", unit): 1.0 / ratio for unit, ratio in _CONFUSIONS.items()}
     whose, unit = min(units, key=lambda key: abs(math.log(factor / units[key])))
     which = f"the {whose}"
-    cause = f"{which} is in {unit} instead of metres, the nearest unit ({units[whose, unit]:.4g})"
+    cause = f"{which} is in {unit}, the nearest unit ({units[whose, unit]:.4g})"
     if abs(factor / units[whose, unit] - 1.0) > MOST_SCALE_ERROR:
         cause, which = "one of both is scaled, by no usual unit of length", "both"
     raise BadInput(

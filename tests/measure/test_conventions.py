@@ -96,8 +96,10 @@ def test_the_nearest_unit_is_named() -> None:
     for factor, words in (
         (0.00102, "reference is in millimetres"),
         (0.29, "reference is in feet"),
-        (39.0, "capture is in inches"),
+        (39.0, "capture is in inches instead of metres"),
         (1e-6, "reference is in micrometres"),
+        (0.3937, "capture is in inches instead of centimetres"),
+        (2.54, "reference is in inches instead of centimetres"),
         (0.75, "scaled, by no usual unit"),
     ):
         with pytest.raises(BadInput, match=words):
