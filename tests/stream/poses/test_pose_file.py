@@ -366,17 +366,22 @@ def test_numbers_of_bodies_keep_all_digits(tmp_path: Path) -> None:
 
 def test_positions_of_markers_are_no_bodies(tmp_path: Path) -> None:
     """NDI's program writes those of each tool's markers behind its pose, under the same names."""
-    header = ",".join(f"Port {tool},Frame,State,Q0,Qx,Qy,Qz,Tx,Ty,Tz" + ",State,Tx,Ty,Tz" * 3 for tool in (1, 2))
+    pose_names = "Q0,Qx,Qy,Qz,Tx,Ty,Tz"
 
-    def tool(n: int, row: int) -> str:
-        numbers_of = numbers([*QUATERNIONS[row], *(1e3 * POSITIONS_M[row])])
-        return f"449A,{n},OK,{numbers_of}" + f",OK,{numbers(1e3 * POSITIONS_M[row] + 50.0)}" * 3
+    def tool(row: int, markers: int) -> str:
+        place = 1e3 * POSITIONS_M[row]
+        return f"{numbers([*QUATERNIONS[row], *place])}" + f",OK,{numbers(place + 50.0)}" * markers
 
-    content = rows(lambda n: f"{tool(n, n)},{tool(n, COUNT - 1 - n)}", [header])
-    log = read_pose_log(write(tmp_path / "a.csv", content), PoseFileOptions(rate_hz=RATE_HZ))
-    assert log.names == ("body1", "body2")
-    assert_motion(log.bodies[0])
-    assert_motion(BodyPoses("2", TIMES_S, log.bodies[1].positions_m[::-1], log.bodies[1].quaternions[::-1]))
+    apart = ",".join(f"Port {tool},Frame,State,{pose_names}" + ",State,Tx,Ty,Tz" * 3 for tool in (1, 2))
+    close = f"Frame,{pose_names},{pose_names},State,Tx,Ty,Tz"
+    for content in (
+        rows(lambda n: ",".join(f"449A,{n},OK,{tool(row, 3)}" for row in (n, COUNT - 1 - n)), [apart]),
+        rows(lambda n: f"{n},{tool(n, 0)},{tool(COUNT - 1 - n, 1)}", [close]),
+    ):
+        log = read_pose_log(write(tmp_path / "a.csv", content), PoseFileOptions(rate_hz=RATE_HZ))
+        assert log.names == ("body1", "body2")
+        assert_motion(log.bodies[0])
+        assert_motion(BodyPoses("2", TIMES_S, log.bodies[1].positions_m[::-1], log.bodies[1].quaternions[::-1]))
 
 
 def test_a_column_of_ever_new_words_names_no_bodies(tmp_path: Path) -> None:
