@@ -91,7 +91,7 @@ def test_drift_of_a_sixth_of_the_motion_is_measured_and_other_axes_are_refused(r
     capture, truth = foreign_pair(rng, Source(drifting))
     assert register(capture, truth).explained["body"][0] > 0.8
     quarter = rotations.rotate(rotations.about_z(np.pi / 2.0), truth.position_m)
-    with pytest.raises(BadInput, match="Positions of the reference disagree with its orientations"):
+    with pytest.raises(BadInput, match="Positions of capture or reference disagree with their orientations"):
         register_poses({"body": capture}, {"body": replace(truth, position_m=quarter)}, plain=True, least_matched=0.6)
 
 
