@@ -11,7 +11,7 @@ from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
 from harness.measure.episode_fit import EpisodeFit
 from harness.measure.gauss_markov import NOISE_KEYS
-from harness.measure.log_series import PAUSE_S, EvenSeries, even_series, find_repeats, neighbour_noise
+from harness.measure.log_series import PAUSE_S, EvenSeries, even_series, neighbour_noise
 from harness.measure.noise_fit import NoiseFit
 from harness.measure.profile import (
     STATIC_CORRELATIONS,
@@ -52,7 +52,7 @@ def measure_log_profile(
     bodies = [body for body in log.bodies if len(body.times_s) >= FEWEST_POSES]
     if not bodies:
         raise BadInput(f"{log.source} has no body with {FEWEST_POSES} poses.", "Record for longer.")
-    repeats = {body.name: find_repeats(body) for body in bodies}
+    repeats = {body.name: body.repeats for body in bodies}
     kept = {name: ~same if same.mean() < _MOST_REPEATS else np.ones(len(same), bool) for name, same in repeats.items()}
     series = {body.name: even_series(body, kept[body.name]) for body in bodies}
     counted = log.clock if log.is_counted else ""

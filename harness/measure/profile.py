@@ -128,11 +128,8 @@ def measure_profile(
     station of `bar` that is not in it.
     """
     require_pair(bar, reader.wire.stations)
-    collected, timing, garbage_bytes = (
-        CollectedReadings(reader.wire.rate_hz, bar),
-        TimingAccumulator(reader.wire.rate_hz),
-        0,
-    )
+    collected, timing = CollectedReadings(reader.wire.rate_hz, bar), TimingAccumulator(reader.wire.rate_hz)
+    garbage_bytes = 0
     for number, block in enumerate(reader.blocks()):
         progress("reading", number, number + 1)
         timing.add(block)

@@ -15,8 +15,8 @@ from harness.measure.conventions import (
     require_same_hand,
     require_scale,
 )
+from harness.measure.pose_registration import register_poses
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
-from harness.measure.registration import register_poses
 from tests.measure.moving_bodies import Tracker, draw_mounts, move_bodies, report_poses
 
 pytestmark = pytest.mark.long

@@ -9,8 +9,9 @@ from harness.core import rotations
 from harness.core.seeds import generator
 from harness.errors import BadInput, NotComparable
 from harness.measure.pose_directions import find_directions, same_directions
+from harness.measure.pose_registration import register_poses
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
-from harness.measure.registration import Registration, register_poses
+from harness.measure.registration import Registration
 from tests.measure.foreign_streams import MOUNT, MOUNT_M, Source, foreign_pair
 from tests.measure.moving_bodies import Tracker
 

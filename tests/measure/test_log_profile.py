@@ -11,7 +11,7 @@ from harness.core.arrays import Floats
 from harness.core.number_format import Interval
 from harness.errors import BadInput
 from harness.measure.log_profile import measure_log_profile
-from harness.measure.log_series import even_series, find_repeats, neighbour_noise
+from harness.measure.log_series import even_series, neighbour_noise
 from harness.measure.profile import Bar
 from harness.measure.sampling import describe_sampling
 from harness.measure.surveyed_points import RestPlace, compare_with_survey
@@ -107,7 +107,7 @@ def test_repeats_are_counted_and_left_out_of_the_noise(rng: np.random.Generator)
     again = np.arange(len(time_s)) % 6 == 5
     place[again], turn[again] = place[np.flatnonzero(again) - 1], turn[np.flatnonzero(again) - 1]
     body = BodyPoses("hand", time_s, place, turn)
-    np.testing.assert_array_equal(find_repeats(body), again)
+    np.testing.assert_array_equal(body.repeats, again)
     found = measure_log_profile(log_of(body))
     assert found.timing.all_stations["timing.duplicate_share"].value == pytest.approx(again.mean())
     assert any("repeat the one before" in note for note in found.limits)

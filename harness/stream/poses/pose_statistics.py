@@ -40,9 +40,6 @@ def measure_sampling(body: BodyPoses) -> BodyStatistics:
     size = float(extent[0]), float(extent[1]), float(extent[2])
     if not len(steps_s):
         return BodyStatistics(body.name, 1, 0.0, None, None, 0, 0.0, 0.0, size)
-    same = (np.diff(body.positions_m, axis=0) == 0.0).all(axis=1) & (np.diff(body.quaternions, axis=0) == 0.0).all(
-        axis=1
-    )
     gap = steps_s >= GAP_STEPS * np.median(steps_s)
     low, high = (1e3 * float(step) for step in np.percentile(steps_s, [5, 95]))
     return BodyStatistics(
@@ -53,6 +50,6 @@ def measure_sampling(body: BodyPoses) -> BodyStatistics:
         (low, high),
         int(np.count_nonzero(gap)),
         float(steps_s.max()),
-        float(np.mean(np.append(False, same))),
+        float(np.mean(body.repeats)),
         size,
     )
