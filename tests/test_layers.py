@@ -46,7 +46,7 @@ RENAMES_FILES = {
     "core/files.py": "the atomic writers",
     "compare/baseline.py": "puts an old baseline aside before a new one takes its place",
     "live/file_outputs.py": "appends to a file, which takes its place with the first frame",
-    "stream/recording/recording.py": "appends to a recording",
+    "stream/recording/recording_writer.py": "appends to a recording",
 }
 """Files that may call os.replace, os.rename or os.fsync, and why."""
 

@@ -17,7 +17,7 @@ from harness.body import retarget_to_own_body
 from harness.mocap import synthetic
 from harness.results.findings import BenchmarkStatement
 from harness.simulate import Simulation, TrackerConfig, noise_preset, simulate_tracker
-from harness.stream.polhemus.codec import CaptureStream, Decoder
+from harness.stream.polhemus.codec import Decoder, FrameReader
 
 MAX_RATIO = 13.0
 """Most CPU time of a frame, relative to MuJoCo's kinematics of one pose: as strict as 20,000 frames/s was."""
@@ -35,7 +35,7 @@ def bench_stream(seed: int = 1, repeats: int = 7) -> list[BenchmarkStatement]:
     parts: tuple[Callable[[], object], ...] = (
         lambda: simulate("default"),
         lambda: simulate("clean"),
-        lambda: list(CaptureStream(simulation.wire_format, simulation.wire)),
+        lambda: FrameReader(simulation.wire_format).feed_all(simulation.wire),
         lambda: _decode_capture(simulation),
         lambda: pose_all(body, simulation.truth_qpos),
     )

@@ -18,7 +18,7 @@ from harness.commands.flags import (
     tracker_config,
 )
 from harness.commands.output import print_result, print_status, recording_note, show_progress, this_command
-from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, pose_options
+from harness.commands.pose_flags import OWN_POSE_FLAGS, add_pose_flags, pose_options
 from harness.commands.unit_results import UnitOptions, add_unit_flags, departure_content, read_expected, write_unit
 from harness.core.network import FASTRAK_PREFIX, VRPN_PREFIX
 from harness.core.package_data import VERSION
@@ -33,7 +33,6 @@ _DEFAULT_STATIC_MIN, _SWEEP_S, _COVERED_S = 17.0, 30.0, 20.0
 """Minutes at rest, in which six stations show a rate of one event a minute to 20 %; seconds of the other stretches."""
 _PORT_ALONE = ("stations", "minutes", "yes", *LINE_FLAGS)
 _PORT_FLAGS = (*_PORT_ALONE, "rate")
-_POSE_FLAGS = tuple(name for name in POSE_FLAGS if name != "rate")
 
 
 def add_characterize(verbs: Verbs) -> None:
@@ -124,7 +123,7 @@ def _is_port(source: str) -> bool:
 
 def _capture_of(args: argparse.Namespace) -> Path:
     """The recording to measure; of a port it is made first."""
-    refuse_flags(args, _POSE_FLAGS, f"with {args.source}", "It is for poses of another program: leave it out.")
+    refuse_flags(args, OWN_POSE_FLAGS, f"with {args.source}", "It is for poses of another program: leave it out.")
     if not _is_port(args.source):
         refuse_flags(args, _PORT_FLAGS, f"with the recording {args.source}", "It is for a port: leave it out.")
         return Path(args.source)

@@ -244,37 +244,36 @@ def process_count(text: str) -> int:
     return count
 
 
+def _numbers(text: str) -> list[float]:
+    """Numbers that commas separate; NaN for other words."""
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        return [math.nan]
+
+
 def positive_float(text: str) -> float:
     """A finite number above 0, for argparse."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value < float("inf"):
+    value, *others = _numbers(text)
+    if others or not 0.0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"{text!r} is not a positive number")
     return value
 
 
 def share(text: str) -> float:
     """Read a share above 0, up to 1."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 < value <= 1.0:
+    value, *others = _numbers(text)
+    if others or not 0.0 < value <= 1.0:
         raise argparse.ArgumentTypeError(f"{text!r} is no share above 0, up to 1")
     return value
 
 
 def parse_pair(text: str) -> tuple[float, float]:
     """Two numbers of 0 or more, for argparse."""
-    try:
-        first, second = (float(word) for word in text.split(","))
-    except ValueError:
-        first = second = math.nan
-    if not (0.0 <= first < math.inf and 0.0 <= second < math.inf):
+    values = _numbers(text)
+    if len(values) != 2 or not all(0.0 <= value < math.inf for value in values):
         raise argparse.ArgumentTypeError(f"{text!r} is no pair of numbers, such as 0.2,0.1")
-    return first, second
+    return values[0], values[1]
 
 
 def split_list(text: str | None) -> list[str]:
@@ -300,11 +299,8 @@ def parse_items(text: str) -> tuple[int, ...]:
 
 def parse_alignment(text: str) -> tuple[tuple[float, ...], ...]:
     """Three points of an alignment frame, such as 0,0,0,1,0,0,0,1,0 [m]."""
-    try:
-        values = [float(number) for number in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) != 9 or not all(abs(value) < float("inf") for value in values):
+    values = _numbers(text)
+    if len(values) != 9 or not all(map(math.isfinite, values)):
         raise argparse.ArgumentTypeError(f"{text!r} is not nine numbers such as 0,0,0,1,0,0,0,1,0")
     return tuple(tuple(values[k : k + 3]) for k in (0, 3, 6))
 

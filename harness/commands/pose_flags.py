@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 POSE_FLAGS = ("columns", "unit", "quaternion", "euler", "up", "time_unit", "rate")
 """Flags of `add_pose_flags`, as attributes of the parsed command line."""
+OWN_POSE_FLAGS = tuple(name for name in POSE_FLAGS if name != "rate")
+"""Those that other uses of a verb do not have."""
 TRUTH_PREFIX = "truth-"
 """Prefix of the same flags for the reference."""
 

@@ -21,7 +21,7 @@ from harness.commands.flags import (
 )
 from harness.commands.output import print_result, print_status, recording_note, show_progress
 from harness.commands.playback_flags import PlaybackOptions, open_playback
-from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, pose_options
+from harness.commands.pose_flags import OWN_POSE_FLAGS, add_pose_flags, pose_options
 from harness.core.network import VRPN_PREFIX
 from harness.core.package_data import VERSION
 from harness.errors import BadInput, Outcome
@@ -29,7 +29,6 @@ from harness.errors import BadInput, Outcome
 if TYPE_CHECKING:
     from harness.stream.recording import RecordingWriter
 
-_POSE_FLAGS = tuple(name for name in POSE_FLAGS if name != "rate")
 SIMULATION_PREFIX = "sim:"
 """Prefix of a scenario's name in place of a port: the simulated line is recorded."""
 
@@ -83,7 +82,7 @@ def run_record(args: argparse.Namespace) -> Outcome:
     if len(paths) > 1 or holds_poses(paths[0]):
         return _record_poses(args, paths)
     args.port = args.port[0]
-    refuse_flags(args, (*_POSE_FLAGS, "mark"), f"with {args.port}", "It is for files of poses: leave it out.")
+    refuse_flags(args, (*OWN_POSE_FLAGS, "mark"), f"with {args.port}", "It is for files of poses: leave it out.")
     with recording_note(args.file):
         return _record(args)
 
@@ -146,17 +145,7 @@ def _record_poses(args: argparse.Namespace, paths: Sequence[Path]) -> Outcome:
     from harness.stream.recording import write_pose_recording
     from harness.study.trust.pose_source import read_poses
 
-    lines = (
-        *(name for name in LINE_FLAGS),
-        "seconds",
-        "send",
-        "allow_writes",
-        "serve",
-        "clip",
-        "noise",
-        "poses",
-        "seed",
-    )
+    lines = (*LINE_FLAGS, "seconds", "send", "allow_writes", "serve", "clip", "noise", "poses", "seed")
     refuse_flags(args, lines, "with a file of poses", "It is for a line: leave it out.")
     found = read_poses(paths, pose_options(args))
     log = found.log if args.stations is None else found.log.select(parse_names(args.stations))
@@ -223,28 +212,24 @@ def _record_line(args: argparse.Namespace) -> Outcome:
     source = "served" if args.serve is not None else "port" if args.send is None else "commands"
     note = {"source": source, "port": args.port, "harness": VERSION, **_plan_note(args)}
     options: dict[str, Any] = {"seconds": args.seconds, "log": print_status, "progress": show_progress}
-    if args.port.startswith(VRPN_PREFIX):
+    if args.serve is None and args.send is None:
         tracker = tracker_config(args, args.port, stations)
         with open_writer(args.file, note, tracker) as writer:
             line = record_port(args.port, tracker, writer, **options)
-        return _print_poses(args, writer, line)
+        show = _print_poses if args.port.startswith(VRPN_PREFIX) else _print_recording
+        return show(args, writer, line)
+    config = line_config(args, args.port, stations)
     with RecordingWriter(args.file, note) as writer:
-        if args.serve is not None:
-            config = line_config(args, args.port, stations)
-            counts = serve_line(args.port, args.serve, config, writer, **options)
-        elif args.send is not None:
-            config = line_config(args, args.port, stations)
+        if args.send is not None:
             exchanges = record_commands(args.port, args.send, config, writer, **options)
+            more: Mapping[str, Any] = {"exchanges": exchanges}
+            lines = format_exchanges(exchanges)
         else:
-            line = record_port(args.port, line_config(args, args.port, stations), writer, **options)
-    if args.serve is not None:
-        unread, lost = counts["unread"], counts["undelivered"]
-        text = [f"{unread} bytes were not read by a program"] if unread else []
-        text += [f"{lost} bytes of a program found no device"] if lost else []
-        return _print_recording(args, writer, more=counts, lines=text)
-    if args.send is not None:
-        return _print_recording(args, writer, more={"exchanges": exchanges}, lines=format_exchanges(exchanges))
-    return _print_recording(args, writer, line)
+            counts = serve_line(args.port, args.serve, config, writer, **options)
+            unread, lost = counts["unread"], counts["undelivered"]
+            more, lines = counts, [f"{unread} bytes were not read by a program"] if unread else []
+            lines += [f"{lost} bytes of a program found no device"] if lost else []
+    return _print_recording(args, writer, more=more, lines=lines)
 
 
 def _print_poses(args: argparse.Namespace, writer: "RecordingWriter", line: Mapping[str, int]) -> Outcome:

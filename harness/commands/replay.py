@@ -18,7 +18,7 @@ from harness.commands.flags import (
     repeat_flags,
 )
 from harness.commands.output import print_caveat, print_data, print_result, print_status
-from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, pose_options
+from harness.commands.pose_flags import OWN_POSE_FLAGS, POSE_FLAGS, add_pose_flags, pose_options
 from harness.core.interrupts import defer_interrupts
 from harness.core.number_format import format_fixed
 from harness.core.progress import ProgressBar
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 _SCORING = ("methods", "scenario", "stations", "clip", "noise", "seed", "calibration")
 """Flags that ask for methods; with a recording --rate too."""
-_POSE_FLAGS = tuple(name for name in POSE_FLAGS if name != "rate")
 
 _POLL_S = 0.2
 """Interval at which the wait for a client can be interrupted [s]."""
@@ -77,7 +76,7 @@ def run_replay(args: argparse.Namespace) -> Outcome:
         refuse_flags(args, ("frames", *_SCORING), "with --vrpn", "It is for a replay that is not served: leave it out.")
     if holds_poses(args.file):
         return _replay_poses(args, speed)
-    refuse_flags(args, _POSE_FLAGS, f"with {args.file.name}", "It is for poses of another program: leave it out.")
+    refuse_flags(args, OWN_POSE_FLAGS, f"with {args.file.name}", "It is for poses of another program: leave it out.")
     recording = read_recording(args.file)
     if recording.answers and not recording.formats:
         return _print_answers(args, recording)

@@ -16,14 +16,13 @@ from harness.commands.flags import (
     refuse_flags,
 )
 from harness.commands.output import print_result, print_status
-from harness.commands.pose_flags import POSE_FLAGS, add_pose_flags, pose_options
+from harness.commands.pose_flags import OWN_POSE_FLAGS, add_pose_flags, pose_options
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome, was_interrupted
 
 if TYPE_CHECKING:
     from harness.view import ViewedMotion
 
-_POSE_FLAGS = tuple(name for name in POSE_FLAGS if name != "rate")
 _MOST_SAVED_S = 60.0
 """Longest movie that the page may ask for [s]; `--save` has no such limit."""
 
@@ -86,7 +85,7 @@ def _open(args: argparse.Namespace) -> "ViewedMotion":
         advice = "Poses of another program name no performer, mounts or motion: leave it out."
         refuse_flags(args, ("methods", "scenario", "clip", "seed", "mocap"), f"with the poses of {args.what}", advice)
         return view_poses(read_poses([Path(args.what)], pose_options(args)))
-    refuse_flags(args, _POSE_FLAGS, f"with {args.what}", "It is for poses of another program: leave it out.")
+    refuse_flags(args, OWN_POSE_FLAGS, f"with {args.what}", "It is for poses of another program: leave it out.")
     of_run = Path(args.what).is_dir()
     playback = {"scenario": args.scenario, "clip": None if of_run else args.clip, "seed": args.seed}
     options = {

@@ -9,8 +9,8 @@ from typing import Any
 def lazy_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """`__getattr__` and `__dir__` of a package, for the names that its `if TYPE_CHECKING` block imports.
 
-    Type checkers read the block as it stands, and the program reads its source. A name is looked up at each
-    use, so that it is always what its module has.
+    Type checkers read the block as it stands, where `A as A` marks a public name, and the program reads its source. A
+    name is looked up at each use, so that it is always what its module has.
 
     The import of `harness` itself comes before the working folder is off the import path. Hence this module imports
     nothing else before a name is used.
@@ -19,6 +19,8 @@ def lazy_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[st
     def load_name(name: str) -> Any:
         from importlib import import_module
 
+        if name == "__all__":
+            return sorted(door_names(package))
         place = None if name.startswith("__") and name != "__version__" else door_names(package).get(name)
         if place is None:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")

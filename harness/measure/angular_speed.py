@@ -70,14 +70,12 @@ def angular_speed(poses: TruthSpline, period_s: float, span_s: float = SPAN_S) -
     return SpeedSeries(grid_s[0] + 0.5 * steps * period_s, period_s, np.where(whole, speed, np.nan))
 
 
-def time_offset(
-    first: Sequence[SpeedSeries], second: Sequence[SpeedSeries], *, least_overlap_s: float = 10.0
-) -> TimeOffset:
+def time_offset(first: Sequence[SpeedSeries], second: Sequence[SpeedSeries]) -> TimeOffset:
     """Find the offset at which pairs of angular speeds correlate best; all pairs share the two clocks.
 
     All series have one period. The offset is refined to a fraction of it by a parabola. Of several offsets that
     correlate as well, as for a motion that repeats, the one with the longest overlap is taken. NotComparable if no
-    offset leaves `least_overlap_s` of overlap [s].
+    offset leaves `LEAST_OVERLAP_S` of overlap [s].
     """
     period_s = first[0].period_s
     if any(abs(series.period_s - period_s) > 1e-9 * period_s for series in (*first, *second)):
@@ -95,11 +93,11 @@ def time_offset(
         begin = length_b - len(_padded(b, origin_b))
         total[:, begin : begin + sums.shape[1]] += sums
     overlap_s = total[2] * period_s / len(first)
-    enough = overlap_s >= least_overlap_s
+    enough = overlap_s >= LEAST_OVERLAP_S
     if not enough.any():
         raise NotComparable(
             f"Capture and reference overlap by at most {overlap_s.max():.1f} s.",
-            f"At least {least_overlap_s:g} s of common motion are needed for the time offset.",
+            f"At least {LEAST_OVERLAP_S:g} s of common motion are needed for the time offset.",
         )
     # Short overlaps correlate by chance: the lower end of Fisher's interval ranks the lags.
     correlation = np.where(enough, total[0] / np.maximum(total[1], 1e-300), -1.0)
@@ -161,13 +159,12 @@ def _parabola(values: Floats, best: int) -> float:
 def coarse_offset(
     stations: Mapping[str, MeasuredPoses],
     splines: Mapping[str, TruthSpline],
-    least_overlap_s: float = LEAST_OVERLAP_S,
 ) -> TimeOffset:
     """Offset of the device's clock from that of the reference, from the angular speeds of all stations."""
     period_s = mean_period_s([station.measured_s for station in stations.values()])
     measured = [angular_speed(station.orientations(), period_s) for station in stations.values()]
     expected = [angular_speed(splines[name], period_s) for name in stations]
-    return time_offset(measured, expected, least_overlap_s=least_overlap_s)
+    return time_offset(measured, expected)
 
 
 def identify_stations(

@@ -29,10 +29,14 @@ UNITS_M = {
     "micrometres": 1e-6, "millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "decimetres": 0.1, "feet": 0.3048,
     "kilometres": 1e3,
 }  # fmt: skip
+_CONFUSIONS = {f"{unit} instead of metres": metres for unit, metres in UNITS_M.items()} | {
+    "inches instead of centimetres": 2.54
+}
+"""Unit of a file instead of the one in which it was read -> ratio of both."""
 _MIRRORED_GAIN = 4.0
 """Factor by which a mirrored fit must leave less than an unmirrored one to be believed [choice]."""
-_LEFT_HANDED = "The reference's axes are left-handed (Unity exports such), or one axis of its file is negated."
-_TO_RIGHT_HANDED = "Convert positions and quaternions to right-handed axes."
+_LEFT_HANDED = "The axes of one are left-handed (Unity exports such), or one axis of its file is negated."
+_TO_RIGHT_HANDED = "To mirror a file, negate z of its positions, and x and y of its quaternions."
 
 
 def require_same_hand(reported_m: Sequence[Floats], reference_m: Sequence[Floats]) -> None:
@@ -48,7 +52,7 @@ def require_same_hand(reported_m: Sequence[Floats], reference_m: Sequence[Floats
     total = float(np.sum(first**2) * np.sum(second**2))
     mirrored, turned = (1.0 - (spread[0] + spread[1] + sign * spread[2]) ** 2 / total for sign in (1.0, -1.0))
     if _MIRRORED_GAIN * mirrored < turned:
-        raise BadInput(f"Positions of the reference are mirrored. {_LEFT_HANDED}", _TO_RIGHT_HANDED)
+        raise BadInput(f"Positions of capture and reference are mirror images. {_LEFT_HANDED}", _TO_RIGHT_HANDED)
 
 
 def _centred(values: Sequence[Floats]) -> Floats:
@@ -66,13 +70,13 @@ def require_scale(factor: float) -> None:
     if factor <= 0.0:
         raise BadInput(
             f"Positions of the capture are {factor:.4g} times those of the reference.",
-            f"Likely cause: positions or quaternions of the reference are of left-handed axes. {_TO_RIGHT_HANDED}",
+            f"Likely cause: positions or quaternions of one are of left-handed axes. {_TO_RIGHT_HANDED}",
         )
-    units = {("reference", unit): metres for unit, metres in UNITS_M.items()}
-    units |= {("capture", unit): 1.0 / metres for unit, metres in UNITS_M.items()}
+    units = {("reference", unit): ratio for unit, ratio in _CONFUSIONS.items()}
+    units |= {("capture", unit): 1.0 / ratio for unit, ratio in _CONFUSIONS.items()}
     whose, unit = min(units, key=lambda key: abs(math.log(factor / units[key])))
     which = f"the {whose}"
-    cause = f"{which} is in {unit} instead of metres, the nearest unit ({units[whose, unit]:.4g})"
+    cause = f"{which} is in {unit}, the nearest unit ({units[whose, unit]:.4g})"
     if abs(factor / units[whose, unit] - 1.0) > MOST_SCALE_ERROR:
         cause, which = "one of both is scaled, by no usual unit of length", "both"
     raise BadInput(
@@ -87,7 +91,7 @@ def require_orientations(residual_rad: Sequence[Floats]) -> None:
     if not middle_rad <= MOST_TURN_RAD:
         raise BadInput(
             f"Orientations of capture and reference disagree by {math.degrees(middle_rad):.0f} deg in the middle.",
-            "Quaternions of the reference may be of left-handed axes, inverted, or in another order than w, x, y, z.",
+            "Quaternions of one may be of left-handed axes, inverted, or in another order than was read.",
         )
 
 
@@ -111,7 +115,7 @@ def require_positions(
         )
     if far or not abs(heading_rad) <= MOST_HEADING_RAD:
         raise BadInput(
-            f"Positions of the reference disagree with its orientations, by {found_m:.2g} m in the middle "
+            f"Positions of capture or reference disagree with their orientations, by {found_m:.2g} m in the middle "
             f"and a heading of {math.degrees(heading_rad):.0f} deg.",
             "Likely cause: positions or quaternions were converted to other axes or a left-handed frame and the others "
             "were not, one axis has another scale, or they are of different times.",

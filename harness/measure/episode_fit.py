@@ -14,7 +14,7 @@ from harness.core.number_format import NORMAL_QUANTILE, Interval
 from harness.core.seeds import generator
 from harness.measure.episode_distributions import episode_share, fit_length, fit_uniform
 from harness.measure.excursions import (
-    DEFAULT_RAMP_S,
+    RAMP_S,
     ExcursionDetector,
     ExcursionEvent,
     Innovations,
@@ -88,7 +88,7 @@ def find_disturbances(
         disturbed = left_out | gaps.lost
         for event in events:
             first = int((event.begin_s - _BEFORE_S) * one.rate_hz)
-            last = int((event.begin_s + event.stay_s + DEFAULT_RAMP_S + _AFTER_S) * one.rate_hz)
+            last = int((event.begin_s + event.stay_s + RAMP_S + _AFTER_S) * one.rate_hz)
             disturbed[max(first, 0) : max(last, 0)] = True
         out.append(SeriesEpisodes(one, echoes, gaps, tuple(events), disturbed))
         residuals.append(residual)
@@ -326,7 +326,7 @@ def _draw_displacement(
     for begin_s in onsets_s:
         stay_s, size_m, direction = rng.uniform(*ends_s), rng.uniform(*ends_m), rng.normal(size=3)
         since_s = time_s - begin_s
-        share = np.clip(np.minimum(since_s, stay_s + DEFAULT_RAMP_S - since_s) / DEFAULT_RAMP_S, 0.0, 1.0)
+        share = np.clip(np.minimum(since_s, stay_s + RAMP_S - since_s) / RAMP_S, 0.0, 1.0)
         out += share[:, None] * (size_m * direction / np.linalg.norm(direction))
     size_m = np.linalg.norm(out, axis=1, keepdims=True)
     largest_m = max(ends_m[1], 1e-9)

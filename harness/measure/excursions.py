@@ -20,7 +20,8 @@ THRESHOLD = 45.0
 """Least squared signal-to-noise ratio of an excursion: noise alone exceeds it once in some hundred hours."""
 LONGEST_STAY_S = 10.6
 """Longest excursion that is searched, from the onset to the beginning of the return [s]."""
-DEFAULT_RAMP_S = 0.2
+RAMP_S = 0.2
+"""Time in which an excursion rises, and in which it returns [s]."""
 _SHORTEST_STAY_S = 0.3
 _STEP_S = 0.025
 """Step of the onsets that are searched [s]; that of the durations is twice as long."""
@@ -83,8 +84,8 @@ class Innovations:
 class ExcursionDetector:
     """Finds excursions in series of one rate, among noise of the position with this process on each axis [m]."""
 
-    def __init__(self, rate_hz: float, noise: ErrorProcess, ramp_s: float = DEFAULT_RAMP_S) -> None:
-        self._rate_hz, self._noise, self._ramp_s = rate_hz, noise, max(ramp_s, 1e-6)
+    def __init__(self, rate_hz: float, noise: ErrorProcess) -> None:
+        self._rate_hz, self._noise = rate_hz, noise
         self._correlation = float(np.exp(-1.0 / (rate_hz * noise.correlation_s)))
         self._white_m = max(noise.white, 1e-3 * noise.drift, 1e-9)
         self._stride = max(round(_STEP_S * rate_hz), 1)
@@ -95,7 +96,7 @@ class ExcursionDetector:
     def _undisturbed_power(self) -> tuple[Floats, float]:
         """Power of excursions of the durations (D,) that are searched, and of a rise alone, without any gap."""
         start = 2 * round(2.0 * self._rate_hz)
-        count = start + int(self._stays[-1]) + round((self._ramp_s + _TAIL_S) * self._rate_hz) + 2
+        count = start + int(self._stays[-1]) + round((RAMP_S + _TAIL_S) * self._rate_hz) + 2
         nothing = self._whiten(np.zeros((count, 3)), np.ones(count, bool))
         power = [self._fit_power(nothing, float(start), float(stay)) for stay in self._stays.tolist()]
         return np.array(power), float(self._rise_power(nothing)[start])
@@ -105,9 +106,9 @@ class ExcursionDetector:
 
     def _rise_power(self, innovations: Innovations) -> Floats:
         """(N,) power of a rise that begins at each sample, as far as its innovations have faded."""
-        horizon = round((self._ramp_s + _TAIL_S) * self._rate_hz)
+        horizon = round((RAMP_S + _TAIL_S) * self._rate_hz)
         arrays = innovations.valid, innovations.gain, innovations.deviation_m
-        return rise_power(*arrays, self._ramp_s * self._rate_hz, horizon, self._correlation)
+        return rise_power(*arrays, RAMP_S * self._rate_hz, horizon, self._correlation)
 
     def innovations(self, series: StaticSeries, left_out: Bools) -> Innovations:
         """Innovations of a series without the samples in `left_out` (N,)."""
@@ -177,7 +178,7 @@ class ExcursionDetector:
         if not any(abs(a - b) < common for a in edges[0] for b in edges[1]):
             return None
         places = sorted(edges[0] + edges[1])
-        rows = slice(max(int(places[0]) - 1, 0), int(places[-1] + (self._ramp_s + _TAIL_S) * self._rate_hz) + 3)
+        rows = slice(max(int(places[0]) - 1, 0), int(places[-1] + (RAMP_S + _TAIL_S) * self._rate_hz) + 3)
         kept = residual.values[rows].copy()
         for fit in (one, other):
             self._add(residual, fit.onset, fit.stay_s, fit.size)
@@ -200,7 +201,7 @@ class ExcursionDetector:
 
     def _strongest(self, residual: Innovations, rise: Floats) -> list[tuple[float, float]]:
         """Onsets and stays of the strongest excursions that do not touch each other."""
-        count, ramp = len(residual.valid), self._ramp_s * self._rate_hz
+        count, ramp = len(residual.valid), RAMP_S * self._rate_hz
         arrays = residual.values, residual.valid, residual.gain, residual.deviation_m
         place = transpose_whiten(*arrays, self._correlation)
         best, which = search_durations(
@@ -260,7 +261,7 @@ class ExcursionDetector:
             innovations.deviation_m,
             onset,
             stay_s * rate_hz,
-            self._ramp_s * rate_hz,
+            RAMP_S * rate_hz,
             round(_TAIL_S * rate_hz),
             self._correlation,
         )
@@ -268,7 +269,7 @@ class ExcursionDetector:
     def _event(self, station: str, valid: Bools, fit: "_Fit") -> ExcursionEvent:
         length_m = float(np.sqrt(fit.size @ fit.size))
         variance_m2 = length_m**2 / max(fit.score, 1e-9)  # of one axis
-        end = fit.onset + (fit.stay_s + 2.0 * self._ramp_s) * self._rate_hz
+        end = fit.onset + (fit.stay_s + 2.0 * RAMP_S) * self._rate_hz
         whole = fit.onset >= _EDGE_S * self._rate_hz and end < len(valid)
         size_m = float(np.sqrt(max(length_m**2 - 2.0 * variance_m2, 0.0)))
         timed = all(self._is_seen(valid, edge) for edge in (fit.onset, fit.onset + fit.stay_s * self._rate_hz))
@@ -276,7 +277,7 @@ class ExcursionDetector:
 
     def _is_seen(self, valid: Bools, edge: float) -> bool:
         """Whether most samples around a rise or a return that begins at this sample count."""
-        ramp = self._ramp_s * self._rate_hz
+        ramp = RAMP_S * self._rate_hz
         first, last = int(edge - 0.5 * ramp), int(edge + 1.5 * ramp) + 1
         return first >= 0 and last <= len(valid) and bool(valid[first:last].mean() > _SEEN)
 

@@ -2,24 +2,38 @@
 
 A station's orientation is `tracker_from_world * world_from_body * body_from_station`. Rotations come first, from the
 Kronecker products of matrices (Shah 2013, J. Mechanisms Robotics 5); all stations share the first factor. Positions
-follow by linear least squares, together with the scale of the tracker.
+follow by linear least squares. Their scale is taken to be exact.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.errors import NotComparable
-from harness.measure.registration_model import RegistrationState
+from harness.measure.registration_fit import solve_normal
+from harness.measure.registration_model import (
+    AHEAD,
+    CLOCK,
+    HEADING,
+    OFFSET,
+    OWN,
+    ROOM_ORIGIN,
+    ROOM_TURN,
+    SCALE,
+    SHARED,
+    RegistrationState,
+)
 
 LEAST_TURN_RAD = 0.05
 """Least spread of the body's orientations about a second axis [rad]; a smaller one is motion about one axis."""
 
 MOST_MEDIANS = 3.0
 """Pairs whose residual is larger than this many medians are left out of the trimmed solution [choice]."""
+_FIXED = (SCALE, HEADING, OFFSET, AHEAD, CLOCK)
+"""Parameters of a registration that pairs at the same instants are taken not to need."""
 _MOST_STEPS = 10
 _MOST_REFINED = 2000
 """About the most pairs of a station by which a solution is refined."""
@@ -48,51 +62,49 @@ class PosePairs:
         freeze(self, tracker_from_station=(count, 4), body_m=(count, 3), world_from_body=(count, 4))
 
 
-def solve_hand_eye(stations: Sequence[PosePairs], *, with_scale: bool = True) -> RegistrationState:
-    """Solve for the room, the scale and the mount of each station by least squares; all other values are zero.
+def solve_hand_eye(stations: Sequence[PosePairs]) -> RegistrationState:
+    """Solve for the room and the mount of each station by least squares; all other values are zero.
 
     NotComparable if no station turns about two axes: the room's and the mounts' turn about the only axis is then
     not observable.
     """
     require_two_axes(stations)
     room, mounts = _solve_rotations(stations)
-    origin_m, scale, mount_m = _solve_positions(stations, room, with_scale)
-    return RegistrationState(0.0, room, origin_m, scale, 0.0, 0.0, 0.0, 0.0, mounts, mount_m)
+    origin_m, mount_m = _solve_positions(stations, room)
+    return RegistrationState(0.0, room, origin_m, 0.0, 0.0, 0.0, 0.0, 0.0, mounts, mount_m)
 
 
-def most_likely_hand_eye(stations: Sequence[PosePairs], *, with_scale: bool = True) -> RegistrationState:
+def most_likely_hand_eye(stations: Sequence[PosePairs]) -> RegistrationState:
     """`solve_hand_eye`, refined by all pairs."""
-    return refine_hand_eye(stations, solve_hand_eye(stations, with_scale=with_scale), with_scale=with_scale)
+    return refine_hand_eye(stations, solve_hand_eye(stations))
 
 
-def solve_trimmed(stations: Sequence[PosePairs], *, with_scale: bool = True) -> RegistrationState:
+def solve_trimmed(stations: Sequence[PosePairs]) -> RegistrationState:
     """As `solve_hand_eye`, of the pairs that agree: those far from the others are left out, again and again.
 
     So a stream that lost its place for a part of its time is registered by the rest (least trimmed squares). The result
     is refined.
     """
-    state, kept = solve_hand_eye(stations, with_scale=with_scale), list(stations)
+    state, kept = solve_hand_eye(stations), list(stations)
     for _ in range(_MOST_STEPS):
         far = [far_pairs(pairs, state, s) for s, pairs in enumerate(stations)]
         chosen = [pairs.rows(~mask) for pairs, mask in zip(stations, far, strict=True)]
         if all(len(a.position_m) == len(b.position_m) for a, b in zip(chosen, kept, strict=True)):
             break
-        state, kept = solve_hand_eye(chosen, with_scale=with_scale), chosen
+        state, kept = solve_hand_eye(chosen), chosen
     thinned = [
         pairs.rows(np.arange(0, len(pairs.position_m), len(pairs.position_m) // _MOST_REFINED + 1)) for pairs in kept
     ]
-    return refine_hand_eye(thinned, state, with_scale=with_scale)
+    return refine_hand_eye(thinned, state)
 
 
-def refine_hand_eye(
-    stations: Sequence[PosePairs], state: RegistrationState, *, with_scale: bool = True
-) -> RegistrationState:
-    """The most likely room, scale and mounts near a state, by all pairs, for independent errors of unknown size.
+def refine_hand_eye(stations: Sequence[PosePairs], state: RegistrationState) -> RegistrationState:
+    """The most likely room and mounts near a state, by all pairs, for independent errors of unknown size.
 
     Gauss-Newton steps, where positions and orientations weigh by their own residuals. The rotations of the closed form
     do not see the positions.
     """
-    size = 7 + 6 * len(stations)
+    size = SHARED + OWN * len(stations)
     for _ in range(_MOST_STEPS):
         parts = [_linearise_pairs(pairs, state, s, size) for s, pairs in enumerate(stations)]
         normal, right = np.zeros((size, size)), np.zeros(size)
@@ -101,21 +113,8 @@ def refine_hand_eye(
             weight = 1.0 / max(float(np.mean(rest**2)), 1e-24)
             normal += weight * slope.T @ slope
             right += weight * slope.T @ rest
-        free = [i for i in range(size) if with_scale or i != 6]
-        step, inside = np.zeros(size), np.ix_(free, free)
-        scale = np.sqrt(np.maximum(np.diag(normal)[free], 1e-300))
-        step[free] = (
-            np.linalg.lstsq(normal[inside] / scale[:, None] / scale, right[free] / scale, rcond=1e-12)[0] / scale
-        )
-        own = step[7:].reshape(-1, 6)
-        state = replace(
-            state,
-            tracker_from_world=rotations.multiply(rotations.exp(step[:3]), state.tracker_from_world),
-            tracker_origin_m=state.tracker_origin_m + step[3:6],
-            scale=state.scale + float(step[6]),
-            body_from_station=rotations.multiply(rotations.exp(own[:, :3]), state.body_from_station),
-            mount_m=state.mount_m + own[:, 3:],
-        )
+        step = solve_normal(normal, right, _FIXED)
+        state = state.moved(step)
         if np.abs(step).max() < 1e-10:
             break
     return state
@@ -124,18 +123,16 @@ def refine_hand_eye(
 def _linearise_pairs(
     pairs: PosePairs, state: RegistrationState, station: int, size: int
 ) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
-    """Residuals (3 N,) and slopes (3 N, size) of positions, then of orientations: room, origin, scale, mounts."""
+    """Residuals (3 N,) and slopes (3 N, size) of positions, then of orientations, by the parameters of a state."""
     place, turn = pair_residuals(pairs, state, station)
-    room, factor = rotations.to_matrix(state.tracker_from_world), 1.0 + state.scale
-    in_room = (pairs.position_m - place) / factor
+    room = rotations.to_matrix(state.tracker_from_world)
     of_place, of_turn = np.zeros((len(place), 3, size)), np.zeros((len(place), 3, size))
-    own = 7 + 6 * station
+    own = SHARED + OWN * station
     turned = room @ rotations.to_matrix(pairs.world_from_body)
-    of_place[:, :, :3] = -factor * rotations.cross_matrix(in_room)
-    of_place[:, :, 3:6] = -factor * room
-    of_place[:, :, 6] = in_room
-    of_place[:, :, own + 3 : own + 6] = factor * turned
-    of_turn[:, :, :3] = np.eye(3)
+    of_place[:, :, ROOM_TURN] = -rotations.cross_matrix(pairs.position_m - place)
+    of_place[:, :, ROOM_ORIGIN] = -room
+    of_place[:, :, own + 3 : own + OWN] = turned
+    of_turn[:, :, ROOM_TURN] = np.eye(3)
     of_turn[:, :, own : own + 3] = turned
     return (place.ravel(), of_place.reshape(-1, size)), (turn.ravel(), of_turn.reshape(-1, size))
 
@@ -144,7 +141,7 @@ def pair_residuals(pairs: PosePairs, state: RegistrationState, station: int) -> 
     """What a state leaves of pairs of one station: positions (N, 3) [m], rotation vectors (N, 3) [rad]."""
     room = state.tracker_from_world
     at_m = pairs.body_m + rotations.rotate(pairs.world_from_body, state.mount_m[station]) - state.tracker_origin_m
-    place = pairs.position_m - (1.0 + state.scale) * rotations.rotate(room, at_m)
+    place = pairs.position_m - rotations.rotate(room, at_m)
     modelled = rotations.multiply(rotations.multiply(room, pairs.world_from_body), state.body_from_station[station])
     return place, rotations.log(rotations.multiply(pairs.tracker_from_station, rotations.inverse(modelled)))
 
@@ -199,27 +196,17 @@ def _nearest_rotation(matrix: Floats) -> Floats:
     return rotations.nearest_rotation(matrix * np.sign(np.linalg.det(matrix))[..., None, None])
 
 
-def _solve_positions(stations: Sequence[PosePairs], room: Floats, with_scale: bool) -> tuple[Floats, float, Floats]:
-    """Origin (3,), scale and mounts (S, 3), from k p = R (b + B m - o), which is linear in k, o and m."""
-    size = 4 + 3 * len(stations)
+def _solve_positions(stations: Sequence[PosePairs], room: Floats) -> tuple[Floats, Floats]:
+    """Origin (3,) and mounts (S, 3), from p = R (b + B m - o), which is linear in o and m."""
+    size = 3 + 3 * len(stations)
     normal, right = np.zeros((size, size)), np.zeros(size)
     for s, pairs in enumerate(stations):
-        in_world = rotations.rotate(rotations.inverse(room), pairs.position_m)
-        rows = np.zeros((len(in_world), 3, size))
-        rows[:, :, 0] = in_world
-        rows[:, :, 1:4] = np.eye(3)
-        rows[:, :, 4 + 3 * s : 7 + 3 * s] = -rotations.to_matrix(pairs.world_from_body)
-        values = pairs.body_m
-        if not with_scale:
-            values, rows[:, :, 0] = values - in_world, 0.0
+        rows = np.zeros((len(pairs.position_m), 3, size))
+        rows[:, :, :3] = np.eye(3)
+        rows[:, :, 3 + 3 * s : 6 + 3 * s] = -rotations.to_matrix(pairs.world_from_body)
+        values = pairs.body_m - rotations.rotate(rotations.inverse(room), pairs.position_m)
         flat = rows.reshape(-1, size)
         normal += flat.T @ flat
         right += flat.T @ values.reshape(-1)
     solution: Floats = np.asarray(np.linalg.lstsq(normal, right, rcond=1e-12)[0], dtype=np.float64)
-    factor = float(solution[0]) if with_scale else 1.0
-    if not factor > 0.1:
-        raise NotComparable(
-            f"Reported positions explain {factor:.2f} of the motion.",
-            "Not observable: the scale. Move through the room, and give the reference in metres.",
-        )
-    return solution[1:4], 1.0 / factor - 1.0, solution[4:].reshape(-1, 3)
+    return solution[:3], solution[3:].reshape(-1, 3)

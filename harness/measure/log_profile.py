@@ -10,7 +10,8 @@ from harness.core.number_format import Interval
 from harness.core.progress import ProgressCallback
 from harness.errors import BadInput
 from harness.measure.episode_fit import EpisodeFit
-from harness.measure.log_series import PAUSE_S, EvenSeries, even_series, find_repeats, neighbour_noise
+from harness.measure.gauss_markov import NOISE_KEYS
+from harness.measure.log_series import PAUSE_S, EvenSeries, even_series, neighbour_noise
 from harness.measure.noise_fit import NoiseFit
 from harness.measure.profile import (
     STATIC_CORRELATIONS,
@@ -28,8 +29,8 @@ from harness.stream.recording import StationReadings
 
 _MOST_REPEATS = 0.5
 """Share of repeats from which on they show the resolution of a body at rest, and are kept [choice]."""
-_NO_REST = "No body rests for 5 s."
-_NO_MARKED_REST = "No body rests for 5 s in a stretch that is marked static, or not marked."
+_NO_REST = "No body rests for 10 s."
+_NO_MARKED_REST = "No body rests for 10 s in a stretch that is marked static, or not marked."
 _NO_HOST = "A file of poses has no clock of a host."
 _EVEN = "All steps are equal, and do not show it."
 
@@ -51,7 +52,7 @@ def measure_log_profile(
     bodies = [body for body in log.bodies if len(body.times_s) >= FEWEST_POSES]
     if not bodies:
         raise BadInput(f"{log.source} has no body with {FEWEST_POSES} poses.", "Record for longer.")
-    repeats = {body.name: find_repeats(body) for body in bodies}
+    repeats = {body.name: body.repeats for body in bodies}
     kept = {name: ~same if same.mean() < _MOST_REPEATS else np.ones(len(same), bool) for name, same in repeats.items()}
     series = {body.name: even_series(body, kept[body.name]) for body in bodies}
     counted = log.clock if log.is_counted else ""
@@ -102,7 +103,8 @@ def _fit(
         else:
             correlation = noise.all_stations["components.drift.correlation_s"]
             longest_s = max(one.duration_s for one in collected.rest)
-            if correlation.is_measured and longest_s < STATIC_CORRELATIONS * correlation.value:
+            drifts = any(noise.all_stations[key].low > 0.0 for key in NOISE_KEYS if "drift" in key)
+            if drifts and longest_s < STATIC_CORRELATIONS * correlation.value:
                 notes.append(
                     f"Errors are correlated over {correlation.value:.3g} s; the longest rest of {longest_s:.3g} s is "
                     f"shorter than {STATIC_CORRELATIONS:g} times that: rest for longer."
@@ -143,7 +145,7 @@ def _timing(bodies: list[BodyPoses], repeats: Mapping[str, Bools], start_s: floa
     """
     rounding_s = float(np.spacing(start_s + max(body.times_s[-1] for body in bodies)))
     by_station = {body.name: _numbers([body], repeats, rounding_s, untimed) for body in bodies}
-    resolution_s = min(_resolution_s(body.times_s) for body in bodies)
+    resolution_s = min(_resolution_s(body.times_s, rounding_s) for body in bodies)
     together = _numbers(bodies, repeats, rounding_s, untimed)
     even = together["timing.jitter_s"].value == 0.0
     together["timing.stamp_resolution_s"] = (
@@ -182,10 +184,13 @@ def _numbers(
     }
 
 
-def _resolution_s(time_s: Floats) -> float:
-    """The largest power of ten that divides every step of rising times (N,) [s], down to a nanosecond."""
+def _resolution_s(time_s: Floats, rounding_s: float) -> float:
+    """The largest power of ten that divides every step of rising times (N,) [s], down to a nanosecond.
+
+    `rounding_s` is the distance of the source's times as 64-bit numbers.
+    """
     for digits in range(0, 9):
         ticks = np.diff(time_s) * 10.0**digits
-        if np.abs(ticks - np.rint(ticks)).max() < 1e-3:
+        if np.abs(ticks - np.rint(ticks)).max() < 1e-3 + 2.0 * rounding_s * 10.0**digits:
             return float(10.0**-digits)
     return 1e-9

@@ -37,14 +37,6 @@ class EvenSeries:
     """Share of the poses that no place took."""
 
 
-def find_repeats(body: BodyPoses) -> Bools:
-    """(N,) whether a pose has exactly the numbers of the one before: the source had no new one."""
-    same = (np.diff(body.positions_m, axis=0) == 0.0).all(axis=1) & (np.diff(body.quaternions, axis=0) == 0.0).all(
-        axis=1
-    )
-    return np.append(False, same)
-
-
 def even_series(body: BodyPoses, kept: Bools) -> EvenSeries:
     """The poses of a mask (N,), at least two, at the highest rate at which hardly a place is empty."""
     time_s, place_m, turn = body.times_s[kept], body.positions_m[kept], body.quaternions[kept]

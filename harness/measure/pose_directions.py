@@ -120,7 +120,7 @@ def _candidate(
         station = inverted_poses(stations[name]) if capture else stations[name]
         spline = TruthSpline(inverted_truth(truths[body]) if truth else truths[body])
         paired.append(_pair_at(station, spline, offset_s))
-    state = solve_trimmed(paired, with_scale=False)
+    state = solve_trimmed(paired)
     turns = [np.linalg.norm(pair_residuals(one, state, s)[1], axis=1) for s, one in enumerate(paired)]
     longest_m = float(np.linalg.norm(state.mount_m, axis=1).max())
     return _Candidate(capture, truth, float(np.median(np.concatenate(turns))), longest_m)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Bools, Floats, freeze
+from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.motion import require_seconds
 from harness.errors import BadInput
 
@@ -37,10 +37,16 @@ class MeasuredPoses:
         freeze(self, position_m=(count, 3), tracker_from_station=(count, 4))
         freeze(self, np.bool_, valid=(count,))
 
+    def rising_rows(self) -> Ints:
+        """Rows of the valid records whose stamps rise."""
+        rows = np.flatnonzero(self.valid & np.isfinite(self.measured_s))
+        at_s = self.measured_s[rows]
+        out: Ints = rows[at_s > np.maximum.accumulate(np.append(-np.inf, at_s))[:-1]]
+        return out
+
     def orientations(self) -> "TruthSpline":
         """Orientations over time, of the valid records whose stamps rise; BadInput with fewer than four of them."""
-        rows = np.flatnonzero(self.valid & np.isfinite(self.measured_s))
-        rows = rows[self.measured_s[rows] > np.maximum.accumulate(np.append(-np.inf, self.measured_s[rows]))[:-1]]
+        rows = self.rising_rows()
         if len(rows) < 4:
             raise BadInput("No pose has a time.", "Send time stamps with the records.")
         turn = self.tracker_from_station[rows]

@@ -128,11 +128,8 @@ def measure_profile(
     station of `bar` that is not in it.
     """
     require_pair(bar, reader.wire.stations)
-    collected, timing, garbage_bytes = (
-        CollectedReadings(reader.wire.rate_hz, bar),
-        TimingAccumulator(reader.wire.rate_hz),
-        0,
-    )
+    collected, timing = CollectedReadings(reader.wire.rate_hz, bar), TimingAccumulator(reader.wire.rate_hz)
+    garbage_bytes = 0
     for number, block in enumerate(reader.blocks()):
         progress("reading", number, number + 1)
         timing.add(block)
@@ -142,7 +139,7 @@ def measure_profile(
         advice = "Let all stations lie still for a minute or more, in sight of the emitters."
         raise BadFile(reader.path, "no stretch in which a station rests", _CAPTURE, advice)
     noise, episodes = (
-        fit_rest(collected.rest, progress) if collected.rest else without_rest("No station rests for 5 s.")
+        fit_rest(collected.rest, progress) if collected.rest else without_rest("No station rests for 10 s.")
     )
     correlation = noise.all_stations["components.drift.correlation_s"]
     longest_s = max((one.duration_s for one in collected.rest), default=0.0)

@@ -21,11 +21,11 @@ from harness.measure.gauss_markov import ErrorProcess
 from harness.measure.pose_series import TruthPoses, TruthSpline
 from harness.measure.registration_fit import (
     FittedRegistration,
-    StationGrid,
     StationNoise,
     refit_residuals,
     refit_steps,
 )
+from harness.measure.station_grid import StationGrid
 
 DRAWS = 12
 """Number of references with added noise of each size."""

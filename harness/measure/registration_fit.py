@@ -22,6 +22,7 @@ from harness.core.number_format import NORMAL_QUANTILE
 from harness.measure.gauss_markov import ErrorProcess, fit_process
 from harness.measure.pose_series import TruthSpline
 from harness.measure.registration_model import CLOCK, OFFSET, OWN, SHARED, RegistrationState, linearise
+from harness.measure.station_grid import StationGrid
 
 OUTLIER, PLAIN_OUTLIER = 4.0, 20.0
 """Residuals of more robust deviations are left out; the second number is for orientations by plain least squares."""
@@ -45,21 +46,6 @@ _LONG_S, _AROUND_S = 0.4, 0.3
 
 StationNoise: TypeAlias = tuple[ErrorProcess, ErrorProcess, ErrorProcess]
 """Noise of position, pitch and roll, and yaw of a station."""
-
-
-@dataclass(frozen=True, eq=False)
-class StationGrid:
-    """Readings of one station on a uniform grid of N places."""
-
-    period_s: float
-    measured_s: Floats
-    """(N,) device time [s]; the grid's own time where no record came."""
-    position_m: Floats
-    """(N, 3); zero where not known."""
-    turn: Floats
-    """(N, 4) `tracker_from_station`; identity where not known."""
-    known: Bools
-    """(N,) whether there is a reading, and the reference at its time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +163,7 @@ def _fit_loosely(
                 place = np.ix_(_columns(s), _columns(s))
                 information[place] += weighted.T @ rows
                 score[_columns(s)] += weighted.T @ residual[:, part].reshape(-1)
-        step = _solve(information, score, fixed)
+        step = solve_normal(information, score, fixed)
         state = state.moved(step)
         if np.abs(step).max() < 1e-7:
             break
@@ -293,7 +279,7 @@ def _whitened_step(
                 rows = slopes[part].reshape(-1, SHARED + OWN)
                 blocks.append(_Block(_columns(s), rows.T @ rows, rows.T @ errors[part].reshape(-1)))
             counts.append(len(parts))
-    return _solve(whole, score, fixed), _NormalSums(information, whole, tuple(blocks), min(counts, default=0))
+    return solve_normal(whole, score, fixed), _NormalSums(information, whole, tuple(blocks), min(counts, default=0))
 
 
 def _block_parts(grid: StationGrid, places: Ints, noise: StationNoise) -> list[slice]:
@@ -375,7 +361,7 @@ def _free(size: int, fixed: Sequence[int]) -> list[int]:
     return [i for i in range(size) if i not in fixed]
 
 
-def _solve(information: Floats, score: Floats, fixed: Sequence[int]) -> Floats:
+def solve_normal(information: Floats, score: Floats, fixed: Sequence[int]) -> Floats:
     """Solution of the normal equations; parameters without information, and fixed ones, do not move."""
     out: Floats = _inverse(information, _free(len(score), fixed)) @ score
     return out

@@ -57,6 +57,7 @@ class StaticSeries:
 def find_rest(readings: StationReadings, rate_hz: float) -> Ints:
     """Rows (K, 2), first and end, of the stretches of at least `MIN_REST_S` in which the station rests.
 
+    Their ends are left out, so that a rest between motions has to last 10 s to be found at any rate.
     Windows of one second are at rest if the median distance from their median pose is small, and if the medians of
     five consecutive windows are near each other. So motion of 2 cm/s or 1 deg/s is found. Echoes, gaps, excursions of
     up to 3 cm and a disagreement for one or two windows do not end a rest. A window without valid readings, in which

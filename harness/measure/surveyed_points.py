@@ -63,8 +63,8 @@ def compare_with_survey(rests: Sequence[RestPlace], points_m: Floats, deviation_
     if len(rests) != len(points_m):
         times = ", ".join(f"{one.begin_s:.1f} s" for one in rests[:12]) or "none"
         raise BadInput(
-            f"{len(rests)} rests of 5 s or more for {len(points_m)} surveyed points (begins: {times}).",
-            "Let the body rest on each point once, in the order of the file.",
+            f"{len(rests)} rests for {len(points_m)} surveyed points (begins: {times}).",
+            "Let the body rest for 10 s or more on each point once, in the order of the file.",
         )
     if len(points_m) < FEWEST_POINTS:
         raise BadInput(f"{len(points_m)} surveyed points.", f"At least {FEWEST_POINTS} show errors.")

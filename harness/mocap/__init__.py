@@ -5,46 +5,26 @@ from typing import TYPE_CHECKING
 from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
-    from harness.mocap.clip_file import CLIP_FORMATS, read_clip
-    from harness.mocap.fetch import fetch_cmu
-    from harness.mocap.file_inspection import inspect_file
-    from harness.mocap.library import LibraryFolders, MotionLibrary, absolute_folders, ignored_paths_note
-    from harness.mocap.read.amc import read_amc
-    from harness.mocap.read.c3d import MarkerClip, read_c3d
-    from harness.mocap.shared_motion import SharedMotion, find_shared_motion
-    from harness.mocap.sources import (
-        MOCAP_VARIABLE,
-        POPULATION_SIZE,
-        MotionSource,
-        SyntheticSource,
-        find_library_folders,
-        folders_of_environment,
-        open_motion_source,
-        read_skeletons,
-    )
+    from harness.mocap.clip_file import CLIP_FORMATS as CLIP_FORMATS
+    from harness.mocap.clip_file import read_clip as read_clip
+    from harness.mocap.fetch import fetch_cmu as fetch_cmu
+    from harness.mocap.file_inspection import inspect_file as inspect_file
+    from harness.mocap.library import LibraryFolders as LibraryFolders
+    from harness.mocap.library import MotionLibrary as MotionLibrary
+    from harness.mocap.library import absolute_folders as absolute_folders
+    from harness.mocap.library import ignored_paths_note as ignored_paths_note
+    from harness.mocap.read.amc import read_amc as read_amc
+    from harness.mocap.read.c3d import MarkerClip as MarkerClip
+    from harness.mocap.read.c3d import read_c3d as read_c3d
+    from harness.mocap.shared_motion import SharedMotion as SharedMotion
+    from harness.mocap.shared_motion import find_shared_motion as find_shared_motion
+    from harness.mocap.sources import MOCAP_VARIABLE as MOCAP_VARIABLE
+    from harness.mocap.sources import POPULATION_SIZE as POPULATION_SIZE
+    from harness.mocap.sources import MotionSource as MotionSource
+    from harness.mocap.sources import SyntheticSource as SyntheticSource
+    from harness.mocap.sources import find_library_folders as find_library_folders
+    from harness.mocap.sources import folders_of_environment as folders_of_environment
+    from harness.mocap.sources import open_motion_source as open_motion_source
+    from harness.mocap.sources import read_skeletons as read_skeletons
 else:
     __getattr__, __dir__ = lazy_names(__name__)
-
-__all__ = [
-    "CLIP_FORMATS",
-    "MOCAP_VARIABLE",
-    "POPULATION_SIZE",
-    "LibraryFolders",
-    "MarkerClip",
-    "MotionLibrary",
-    "MotionSource",
-    "SharedMotion",
-    "SyntheticSource",
-    "absolute_folders",
-    "fetch_cmu",
-    "find_library_folders",
-    "find_shared_motion",
-    "folders_of_environment",
-    "ignored_paths_note",
-    "inspect_file",
-    "open_motion_source",
-    "read_amc",
-    "read_c3d",
-    "read_clip",
-    "read_skeletons",
-]

@@ -116,9 +116,7 @@ class ViewerContent:
         return Resource(_JSON, json.dumps(packed).encode())
 
 
-def viewer_page(
-    title: str, kicker: str, style: str, *parts: Markup | None, script: str, token: str, header: Markup | None = None
-) -> bytes:
+def viewer_page(title: str, kicker: str, style: str, *parts: Markup | None, script: str, token: str) -> bytes:
     """The page of a viewer: parts below a header, and a script that carries the token of its commands."""
     head = tag(
         "head",
@@ -131,7 +129,7 @@ def viewer_page(
     )
     body = tag(
         "body",
-        tag("header", tag("p", kicker, class_="kicker"), tag("h1", title), header),
+        tag("header", tag("p", kicker, class_="kicker"), tag("h1", title)),
         *parts,
         tag("script", src=script, data_token=token, data_header=COMMAND_HEADER, id_="viewer"),
     )

@@ -43,7 +43,7 @@ def test_a_simulated_recording_that_is_stopped_in_the_middle_leaves_the_file_as_
     if existing:
         record_capture(path, FOUR, capture, {})
     before = path.read_bytes() if existing else None
-    monkeypatch.setattr("harness.stream.recording.recording._CHUNKS_PER_WRITE", 100)
+    monkeypatch.setattr("harness.stream.recording.recording_writer._CHUNKS_PER_WRITE", 100)
     original, seen = RecordingWriter.on_simulated, list[int]()
 
     def stop_after(writer: RecordingWriter, chunks: Any) -> None:

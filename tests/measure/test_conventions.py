@@ -15,8 +15,8 @@ from harness.measure.conventions import (
     require_same_hand,
     require_scale,
 )
+from harness.measure.pose_registration import register_poses
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
-from harness.measure.registration import register_poses
 from tests.measure.moving_bodies import Tracker, draw_mounts, move_bodies, report_poses
 
 pytestmark = pytest.mark.long
@@ -51,18 +51,18 @@ def changed(truths: dict[str, TruthPoses], place: Floats | float, turn: Floats |
 @pytest.mark.parametrize(
     ("place", "turn", "cause"),
     [
-        (MIRROR, MIRROR_TURN, "left-handed"),
+        (MIRROR, MIRROR_TURN, "are mirror images.*left-handed.*negate z"),
         (MIRROR, 1.0, "left-handed"),
         (-1.0, 1.0, "left-handed"),
         (100.0 * MIRROR, MIRROR_TURN, "left-handed"),
         (
             1.0,
             MIRROR_TURN,
-            "Quaternions of the reference|disagree with its orientations|Positions of h",
+            "Quaternions of one|disagree with their orientations|Positions of h",
         ),
-        (QUARTER_TURN, 1.0, "Positions of the reference disagree with its orientations"),
+        (QUARTER_TURN, 1.0, "Positions of capture or reference disagree with their orientations"),
         (np.array([1.0, 1.0, 0.5]), 1.0, "Positions of"),
-        (1.0, INVERSE, "Quaternions of the reference|Positions of"),
+        (1.0, INVERSE, "Quaternions of one|Positions of"),
         (1.0 / 0.3048, 1.0, "reference is in feet"),
         (1.0 / 0.0254, 1.0, "reference is in inches"),
         (100.0, 1.0, "reference is in centimetres"),
@@ -96,8 +96,10 @@ def test_the_nearest_unit_is_named() -> None:
     for factor, words in (
         (0.00102, "reference is in millimetres"),
         (0.29, "reference is in feet"),
-        (39.0, "capture is in inches"),
+        (39.0, "capture is in inches instead of metres"),
         (1e-6, "reference is in micrometres"),
+        (0.3937, "capture is in inches instead of centimetres"),
+        (2.54, "reference is in inches instead of centimetres"),
         (0.75, "scaled, by no usual unit"),
     ):
         with pytest.raises(BadInput, match=words):
@@ -121,7 +123,7 @@ def test_motion_in_one_plane_is_in_no_mirror(rng: np.random.Generator) -> None:
     place = rng.normal(size=(100, 3)) * np.array([1.0, 1.0, 0.0])
     noise = 0.003 * rng.normal(size=(100, 3))
     require_same_hand([place + noise], [place * MIRROR])
-    with pytest.raises(BadInput, match="mirrored"):
+    with pytest.raises(BadInput, match="mirror images"):
         require_same_hand([place + 10.0 * noise], [(place + 10.0 * noise) * MIRROR])
 
 
@@ -138,7 +140,7 @@ def test_positions_that_do_not_follow_are_named(rng: np.random.Generator) -> Non
     with pytest.raises(BadInput, match=r"Positions of hand .* those of the other stations agree"):
         require_positions({"head": small, "hand": large}, 1.0, 0.0)
     for heading_rad, residual in ((0.0, large), (-1.5, small), (np.nan, small)):
-        with pytest.raises(BadInput, match="disagree with its orientations"):
+        with pytest.raises(BadInput, match="disagree with their orientations"):
             require_positions({"head": residual}, 1.0, heading_rad)
 
 

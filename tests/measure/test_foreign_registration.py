@@ -9,8 +9,9 @@ from harness.core import rotations
 from harness.core.seeds import generator
 from harness.errors import BadInput, NotComparable
 from harness.measure.pose_directions import find_directions, same_directions
+from harness.measure.pose_registration import register_poses
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
-from harness.measure.registration import Registration, register_poses
+from harness.measure.registration import Registration
 from tests.measure.foreign_streams import MOUNT, MOUNT_M, Source, foreign_pair
 from tests.measure.moving_bodies import Tracker
 
@@ -91,7 +92,7 @@ def test_drift_of_a_sixth_of_the_motion_is_measured_and_other_axes_are_refused(r
     capture, truth = foreign_pair(rng, Source(drifting))
     assert register(capture, truth).explained["body"][0] > 0.8
     quarter = rotations.rotate(rotations.about_z(np.pi / 2.0), truth.position_m)
-    with pytest.raises(BadInput, match="Positions of the reference disagree with its orientations"):
+    with pytest.raises(BadInput, match="Positions of capture or reference disagree with their orientations"):
         register_poses({"body": capture}, {"body": replace(truth, position_m=quarter)}, plain=True, least_matched=0.6)
 
 

@@ -11,7 +11,7 @@ from harness.core.arrays import Floats
 from harness.core.number_format import Interval
 from harness.errors import BadInput
 from harness.measure.log_profile import measure_log_profile
-from harness.measure.log_series import even_series, find_repeats, neighbour_noise
+from harness.measure.log_series import even_series, neighbour_noise
 from harness.measure.profile import Bar
 from harness.measure.sampling import describe_sampling
 from harness.measure.surveyed_points import RestPlace, compare_with_survey
@@ -78,7 +78,7 @@ def test_marks_say_where_rests_and_motion_count(rng: np.random.Generator) -> Non
     assert sum(one.records for one in found.stretches) == len(body.times_s)
     assert max(one.duration_s for one in found.rest) < 41.0
     missing = measure_log_profile(log, [(0.0, "slow")]).noise.all_stations["components.white.position_m"]
-    assert missing.reason == "No body rests for 5 s in a stretch that is marked static, or not marked."
+    assert missing.reason == "No body rests for 10 s in a stretch that is marked static, or not marked."
 
 
 def test_an_even_series_takes_the_nearest_pose_and_leaves_few_holes(rng: np.random.Generator) -> None:
@@ -107,11 +107,11 @@ def test_repeats_are_counted_and_left_out_of_the_noise(rng: np.random.Generator)
     again = np.arange(len(time_s)) % 6 == 5
     place[again], turn[again] = place[np.flatnonzero(again) - 1], turn[np.flatnonzero(again) - 1]
     body = BodyPoses("hand", time_s, place, turn)
-    np.testing.assert_array_equal(find_repeats(body), again)
+    np.testing.assert_array_equal(body.repeats, again)
     found = measure_log_profile(log_of(body))
     assert found.timing.all_stations["timing.duplicate_share"].value == pytest.approx(again.mean())
     assert any("repeat the one before" in note for note in found.limits)
-    assert found.noise.all_stations["components.white.position_m"].reason == "No body rests for 5 s."
+    assert found.noise.all_stations["components.white.position_m"].reason == "No body rests for 10 s."
     assert neighbour_noise(body, ~again)[0] == pytest.approx(0.002, rel=0.1)
 
 
@@ -199,7 +199,7 @@ def test_rests_on_surveyed_points_show_errors_scale_and_budget() -> None:
 def test_surveys_that_fix_nothing_are_refused(rng: np.random.Generator) -> None:
     line = np.outer(np.arange(5.0), np.array([1.0, 0.5, 0.0]))
     for places, points, words in (
-        (rests(POINTS_M, 0.0, rng), POINTS_M[:5], "7 rests of 5 s or more for 5 surveyed points"),
+        (rests(POINTS_M, 0.0, rng), POINTS_M[:5], "7 rests for 5 surveyed points .* 10 s or more on each"),
         (rests(POINTS_M[:3], 0.0, rng), POINTS_M[:3], "At least 4"),
         (rests(line, 0.0, rng), line, "lie on one line"),
         (
@@ -242,6 +242,23 @@ def test_steps_that_are_equal_show_no_resolution_and_no_jitter(rng: np.random.Ge
     timing = measure_log_profile(log_of(rounded)).timing.all_stations
     assert timing["timing.stamp_resolution_s"].value == 0.01
     assert timing["timing.jitter_s"].value == pytest.approx(0.005, rel=0.05)
+
+
+def test_the_resolution_of_unix_times_is_found_beside_their_rounding(rng: np.random.Generator) -> None:
+    body = resting(rng, 30.0)
+    unix_s = np.round(1.7e9 + body.times_s, 4)
+    log = replace(log_of(replace(body, times_s=unix_s - unix_s[0])), start_unix_s=float(unix_s[0]))
+    assert measure_log_profile(log).timing.all_stations["timing.stamp_resolution_s"].value == 1e-4
+
+
+def test_a_rest_is_long_enough_where_nothing_drifts(rng: np.random.Generator) -> None:
+    """The correlation time of a drift of zero is any number."""
+    time_s = np.arange(6000.0) / 50.0
+    turn = rotations.exp(0.0006 * rng.normal(size=(6000, 3)))
+    for drift_m, words in ((0.0, False), (0.002, True)):
+        place = WHITE_M * rng.normal(size=(6000, 3)) + drift_m * np.sin(0.1 * time_s)[:, None]
+        limits = measure_log_profile(log_of(BodyPoses("tracker", time_s, place, turn))).limits
+        assert any("rest for longer" in limit for limit in limits) == words
 
 
 def test_times_that_were_counted_measure_no_clock(rng: np.random.Generator) -> None:

@@ -59,3 +59,10 @@ def test_pairs_must_exist() -> None:
             require_pairs({"left": station}, truths, pairs)
     with pytest.raises(BadInput, match="No station has a body"):
         require_pairs({"left": station}, truths, {})
+
+
+def test_records_whose_stamps_repeat_or_fall_are_left_out() -> None:
+    stamp_s = np.array([0.0, 1.0, 1.0, np.nan, 0.5, 2.0, 3.0])
+    valid = np.array([True, True, True, True, True, False, True])
+    poses = MeasuredPoses(stamp_s, np.zeros((7, 3)), np.tile(rotations.IDENTITY, (7, 1)), valid)
+    assert poses.rising_rows().tolist() == [0, 1, 6]

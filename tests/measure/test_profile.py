@@ -69,7 +69,7 @@ def test_a_bar_that_only_moves_is_measured_without_noise() -> None:
     assert found.rigid is not None
     assert found.rigid.length_m.value == pytest.approx(float(np.linalg.norm(LEVER_M)), abs=1e-4)
     assert len(found.rigid.places) == 4
-    assert found.noise.all_stations[NOISE_KEYS[0]].reason == "No station rests for 5 s."
+    assert found.noise.all_stations[NOISE_KEYS[0]].reason == "No station rests for 10 s."
     assert found.rest == ()
 
 

@@ -14,8 +14,9 @@ from harness.core.motion import BodyMotion
 from harness.core.number_format import Interval
 from harness.core.seeds import generator
 from harness.errors import BadInput
+from harness.measure.pose_registration import register_poses
 from harness.measure.pose_series import MeasuredPoses, TruthPoses
-from harness.measure.registration import MountFit, Registration, register_poses
+from harness.measure.registration import MountFit, Registration
 from harness.mocap import MotionLibrary, synthetic
 from harness.simulate import noise_preset
 from tests.measure.boxing_captures import BoxingCapture, capture_boxing

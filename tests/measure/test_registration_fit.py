@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from harness.measure.registration_fit import StationGrid, _agreeing, _Block, _corrected_score, _covariance
+from harness.measure.registration_fit import _agreeing, _Block, _corrected_score, _covariance
+from harness.measure.station_grid import StationGrid
 
 
 def test_excursions_are_left_out_with_their_ends_and_across_gaps(rng: np.random.Generator) -> None:

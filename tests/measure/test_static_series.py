@@ -118,6 +118,15 @@ def test_a_quick_step_ends_a_rest_and_another_begins() -> None:
     assert 680 <= runs[0, 1] <= 810 <= runs[1, 0] <= 960
 
 
+@pytest.mark.parametrize("first", [0, 7, 20, 33])
+def test_a_rest_of_ten_seconds_between_motions_is_found(first: int) -> None:
+    """As a probe is carried from one surveyed point to the next, wherever the windows begin."""
+    plain = station_readings(simulate_static(noise_preset("noise"), 1, seconds=46.0), 0)
+    way_m = np.interp(np.arange(1840) % 460, [0, 400, 460], [0.0, 0.0, 0.3]) + 0.3 * (np.arange(1840) // 460)
+    position_m = plain.position_m + way_m[:, None]
+    assert len(find_rest(some_rows(replace(plain, position_m=position_m), np.arange(first, 1840)), 40.0)) == 4
+
+
 def test_a_lost_station_rests_on_but_no_rest_begins_with_it() -> None:
     plain = station_readings(simulate_static(noise_preset("noise"), 1, seconds=40.0), 0)
     lost = np.zeros(1600, bool)

@@ -2,6 +2,7 @@
 
 import dataclasses
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,8 @@ from harness.simulate.noise import NOISE_PRESETS, Noise, noise_preset
 from harness.simulate.simulation import Simulation, sampling_times_s, simulate_tracker
 from harness.simulate.trajectory import Trajectory
 from harness.stream import TrackerFrame
-from harness.stream.polhemus.codec import ByteCapture, CaptureStream, FrameReader
+from harness.stream.polhemus.codec import ByteCapture, FrameReader
+from harness.stream.recording import RecordingStream, record_capture
 from harness.testing.stream_checks import check_stream
 from tests.simulate.conftest import worn
 
@@ -210,11 +212,12 @@ def test_a_slipped_strap_is_a_tracker_mounted_elsewhere(boxer: Boxer) -> None:
     ],
     ids=["clean", "default", "overload", "no skew", "lost"],
 )
-def test_every_simulated_stream_keeps_to_the_contract(boxer: Boxer, noise: Noise, tracker: TrackerConfig) -> None:
+def test_every_simulated_stream_keeps_to_the_contract(
+    boxer: Boxer, noise: Noise, tracker: TrackerConfig, tmp_path: Path
+) -> None:
     simulation = seen(boxer, noise, tracker)
-    frames = check_stream(
-        lambda: CaptureStream(simulation.wire_format, simulation.wire), rate_hz=tracker.rate_hz, at_most=10_000
-    )
+    path = record_capture(tmp_path / "a.rec", simulation.wire_format, simulation.wire, {}).path
+    frames = check_stream(lambda: RecordingStream(path), rate_hz=tracker.rate_hz, at_most=10_000)
     assert len(frames) == len(simulation.frames)
 
 
@@ -241,6 +244,7 @@ def test_the_wire_can_be_cut_at_any_byte(boxer: Boxer, rng: np.random.Generator)
     for cut in rng.integers(1000, 5000, 5).tolist():
         kept = int(np.searchsorted(wire.ends, cut, side="right"))
         part = ByteCapture(wire.data[:cut], np.append(wire.ends[:kept], cut), wire.received_s[: kept + 1])
-        frames = list(CaptureStream(simulation.wire_format, part))
+        reader = FrameReader(simulation.wire_format)
+        frames = [*reader.feed_all(part), *reader.finish()]
         assert len(frames) in (kept // 6, kept // 6 + 1)
         assert all(same(a, b) for a, b in zip(frames[: kept // 6], simulation.frames, strict=False))

@@ -15,7 +15,7 @@ from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
 from harness.stream.polhemus.codec.reader import ByteCapture, FrameReader, WireFormat
 from harness.stream.polhemus.codec.samples import DeviceSamples
-from harness.stream.recording.recording import RecordingWriter, record_capture
+from harness.stream.recording.recording_writer import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
 
 FRAMES = 80

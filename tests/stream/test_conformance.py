@@ -14,7 +14,7 @@ from harness.stream.emulators import serve_emulator
 from harness.stream.is900.driver.is900 import Is900
 from harness.stream.polhemus.codec.reader import ByteCapture, WireFormat
 from harness.stream.polhemus.codec.records import RecordValues, encode_records
-from harness.stream.recording.recording import RecordingWriter
+from harness.stream.recording.recording_writer import RecordingWriter
 from harness.stream.recording.replay import RecordingStream
 from harness.testing.stream_checks import check_stream
 from tests.long_demo import write_long_demo

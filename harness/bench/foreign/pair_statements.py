@@ -86,7 +86,7 @@ def _mount(pair: ComparedPair) -> list[BenchmarkStatement]:
     pairs = _keyframes(pair)
     station = references.pose_matrices(pairs.position_m, pairs.tracker_from_station)
     body = references.pose_matrices(pairs.body_m, pairs.world_from_body)
-    state = most_likely_hand_eye([pairs], with_scale=False)
+    state = most_likely_hand_eye([pairs])
     origin_m = -rotations.rotate(state.tracker_from_world, state.tracker_origin_m)
     ours = HandEye(
         references.pose_matrices(state.mount_m, state.body_from_station)[0],

@@ -310,7 +310,8 @@ def _spectra(rest: tuple[StaticSeries, ...]) -> tuple[DensityCurve, ...]:
     curves = []
     for station in dict.fromkeys(one.station for one in rest):
         pooled = pool_spectra([measure_spectrum(one.position_m, one.rate_hz) for one in rest if one.station == station])
-        curves.append(DensityCurve(station, pooled.frequency_hz, pooled.density_m2_hz))
+        if pooled.segments:
+            curves.append(DensityCurve(station, pooled.frequency_hz, pooled.density_m2_hz))
     return tuple(curves)
 
 

@@ -16,9 +16,10 @@ from harness.mocap.synthetic.limb_ik import horizontal_vector, stack_columns
 from harness.mocap.synthetic.performers import Habits, sample_posture_offsets
 
 
-def _out_and_back(value: float, wind_up: float = 0.0, hit_s: float = 0.24, back_s: float = 0.58) -> Keyframes:
+def _out_and_back(value: float, wind_up: float = 0.0) -> Keyframes:
     """Keyframes of a punch: a short wind-up, `value` at the hit, and back to 0."""
-    return [(0.0, 0.0), (0.3 * hit_s, -wind_up * value), (hit_s, value), (hit_s + 0.05, 0.97 * value), (back_s, 0.0)]
+    hit_s = 0.24
+    return [(0.0, 0.0), (0.3 * hit_s, -wind_up * value), (hit_s, value), (hit_s + 0.05, 0.97 * value), (0.58, 0.0)]
 
 
 _JAB: Mapping[str, Keyframes] = {

@@ -50,9 +50,9 @@ def details(title: Any, *content: Any, id_: str | None = None) -> Markup:
     return tag("details", tag("summary", title), *content, id_=id_)
 
 
-def bullet_list(items: Sequence[Any], class_: str | None = "notes") -> Markup:
+def bullet_list(items: Sequence[Any]) -> Markup:
     """A bulleted list; nothing without items."""
-    return tag("ul", *(tag("li", item) for item in items), class_=class_) if items else Markup()
+    return tag("ul", *(tag("li", item) for item in items), class_="notes") if items else Markup()
 
 
 def inline_code(text: str) -> Markup:

@@ -43,15 +43,11 @@ def statement_row(statement: BenchmarkStatement) -> list[object]:
 
 
 def format_statements(
-    statements: Sequence[BenchmarkStatement],
-    *,
-    target: str = "target",
-    reference: str = "reference, in the same run",
-    width: int = WIDTH,
+    statements: Sequence[BenchmarkStatement], *, reference: str = "reference, in the same run"
 ) -> list[str]:
-    """The table in lines of at most `width` characters; `target` and `reference` are the heads of their columns."""
+    """The table in lines; `reference` is the head of its last column."""
     rows = [statement_row(statement) for statement in statements]
-    return table_lines(DataTable(statement_head(target=target, reference=reference), rows), width) if rows else []
+    return table_lines(DataTable(statement_head(reference=reference), rows), WIDTH) if rows else []
 
 
 def _difference(statement: BenchmarkStatement) -> object:

@@ -134,12 +134,12 @@ def to_png(figure: Figure, dpi: int = 130) -> bytes:
     return file.getvalue()
 
 
-def to_pdf(figure: Figure, settings: dict[Any, Any] = PRINT_SETTINGS) -> bytes:
+def to_pdf(figure: Figure) -> bytes:
     """The figure as PDF with its fonts; the same figure gives the same bytes."""
     import matplotlib
 
     file = io.BytesIO()
-    with matplotlib.rc_context(settings):
+    with matplotlib.rc_context(PRINT_SETTINGS):
         figure.savefig(file, format="pdf", metadata=dict.fromkeys(("CreationDate", "Creator", "Producer")))
     return file.getvalue()
 

@@ -106,7 +106,8 @@ def spectrum_chart(report: UnitReport) -> Chart | None:
         "spectrum",
         "Spectrum of the position at rest",
         "Power spectral density, summed over the three axes. The area below a curve between two frequencies is the "
-        "variance there. A flat curve is white noise; one that falls is noise that lasts; a peak is a vibration.",
+        "variance there. A flat curve is white noise; one that falls is noise that lasts; a peak is a vibration. A "
+        "station without a curve has no 10 s without a gap.",
         "Power spectral density of the position at rest in square millimetres per hertz, of each station; the numbers "
         "are in the table below.",
         draw,

@@ -145,7 +145,8 @@ def _over_stations(report: UnitReport, name: str) -> str:
 def _noise_sentence(values: Mapping[str, Interval]) -> str:
     nouns = {"components.white.position_m": "white noise", "components.drift.position_m": "drift"}
     parts = [f"{_number(values, key)} of {noun}" for key, noun in nouns.items() if key in values]
-    lasting = _number(values, "components.drift.correlation_s")
+    drift = values.get("components.drift.position_m")
+    lasting = _number(values, "components.drift.correlation_s") if drift and drift.low > 0.0 else ""
     return (
         f"On each axis a position has {' and '.join(parts)}{', which lasts ' * bool(lasting)}{lasting}."
         if parts
@@ -176,6 +177,7 @@ def _share_sentence(values: Mapping[str, Interval]) -> str:
     nouns = {
         "components.echo.share": "echoes",
         "components.dropout.share": "lost",
+        "timing.lost_share": "missing",
         "timing.duplicate_share": "sent twice",
     }
     parts = [f"{_number(values, key)} are {noun}" for key, noun in nouns.items() if key in values]

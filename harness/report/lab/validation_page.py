@@ -39,6 +39,8 @@ def offsets_chart(report: ValidationReport) -> Chart | None:
             draw_interval(axes, row, (number.low, number.high), number.value, color=colour, marker="o")
         label_rows(axes, names)
         axes.set_xlabel("time offset [ms]")
+        axes.ticklabel_format(axis="x", useOffset=False)
+        axes.locator_params(axis="x", nbins=5)
 
     return draw_chart(
         "offsets",

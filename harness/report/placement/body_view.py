@@ -61,8 +61,8 @@ def draw_station(axes: Axes, at: tuple[float, float], colour: str, *, hollow: bo
     axes.add_patch(Circle(at, scale * DISC_M, zorder=3, **look))
 
 
-def draw_ring(axes: Axes, at: tuple[float, float], scale: float = 1.0) -> None:
+def draw_ring(axes: Axes, at: tuple[float, float]) -> None:
     """Draw the ring of a recommended station around its disc."""
     from matplotlib.patches import Circle
 
-    axes.add_patch(Circle(at, scale * DISC_M + 0.026, facecolor="none", edgecolor=INK, linewidth=2.0, zorder=4))
+    axes.add_patch(Circle(at, DISC_M + 0.026, facecolor="none", edgecolor=INK, linewidth=2.0, zorder=4))

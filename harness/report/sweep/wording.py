@@ -121,9 +121,9 @@ def group_failures(sweep: SweepData) -> dict[str, list[str]]:
     return dict(sorted(cells_of.items(), key=lambda item: -len(item[1])))
 
 
-def list_values(key: VariedKey, most: int = 8) -> str:
+def list_values(key: VariedKey) -> str:
     """The first values of a key, and the number of the others."""
-    return list_first(key.labels, most)
+    return list_first(key.labels, 8)
 
 
 def _format_error(value: float) -> str:

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
-    from harness.stream.fastrak.driver import Fastrak, FastrakConfig
-    from harness.stream.fastrak.emulator import FastrakEmulator, FastrakEmulatorConfig
+    from harness.stream.fastrak.driver import Fastrak as Fastrak
+    from harness.stream.fastrak.driver import FastrakConfig as FastrakConfig
+    from harness.stream.fastrak.emulator import FastrakEmulator as FastrakEmulator
+    from harness.stream.fastrak.emulator import FastrakEmulatorConfig as FastrakEmulatorConfig
 else:
     __getattr__, __dir__ = lazy_names(__name__)
-
-__all__ = ["Fastrak", "FastrakConfig", "FastrakEmulator", "FastrakEmulatorConfig"]

@@ -5,32 +5,20 @@ from typing import TYPE_CHECKING
 from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
-    from harness.stream.polhemus.driver.open_transport import open_transport
-    from harness.stream.polhemus.emulator.config import EmulatorConfig
-    from harness.stream.polhemus.emulator.device_state import SentMessage
-    from harness.stream.polhemus.emulator.emulator import LineEmulator
-    from harness.stream.polhemus.emulator.faults import Fault, FaultKind, add_byte_faults, unapplied_kinds
-    from harness.stream.polhemus.emulator.server import EmulatorServer, open_port, play_emulator
-    from harness.stream.polhemus.emulator.settings import DEFAULT_EMITTERS
-    from harness.stream.polhemus.emulator.tcp_port import TcpPort
-    from harness.stream.polhemus.emulator.udp_broadcast import UdpPort, parse_udp_address
+    from harness.stream.polhemus.driver.open_transport import open_transport as open_transport
+    from harness.stream.polhemus.emulator.config import EmulatorConfig as EmulatorConfig
+    from harness.stream.polhemus.emulator.device_state import SentMessage as SentMessage
+    from harness.stream.polhemus.emulator.emulator import LineEmulator as LineEmulator
+    from harness.stream.polhemus.emulator.faults import Fault as Fault
+    from harness.stream.polhemus.emulator.faults import FaultKind as FaultKind
+    from harness.stream.polhemus.emulator.faults import add_byte_faults as add_byte_faults
+    from harness.stream.polhemus.emulator.faults import unapplied_kinds as unapplied_kinds
+    from harness.stream.polhemus.emulator.server import EmulatorServer as EmulatorServer
+    from harness.stream.polhemus.emulator.server import open_port as open_port
+    from harness.stream.polhemus.emulator.server import play_emulator as play_emulator
+    from harness.stream.polhemus.emulator.settings import DEFAULT_EMITTERS as DEFAULT_EMITTERS
+    from harness.stream.polhemus.emulator.tcp_port import TcpPort as TcpPort
+    from harness.stream.polhemus.emulator.udp_broadcast import UdpPort as UdpPort
+    from harness.stream.polhemus.emulator.udp_broadcast import parse_udp_address as parse_udp_address
 else:
     __getattr__, __dir__ = lazy_names(__name__)
-
-__all__ = [
-    "DEFAULT_EMITTERS",
-    "EmulatorConfig",
-    "EmulatorServer",
-    "Fault",
-    "FaultKind",
-    "LineEmulator",
-    "SentMessage",
-    "TcpPort",
-    "UdpPort",
-    "add_byte_faults",
-    "open_port",
-    "open_transport",
-    "parse_udp_address",
-    "play_emulator",
-    "unapplied_kinds",
-]

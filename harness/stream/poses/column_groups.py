@@ -47,6 +47,10 @@ class _Group:
             return tuple(sorted(self.columns.values()))
         return tuple(self.columns[axis] for axis in sorted(self.columns, key=lambda axis: axis[::-1]))
 
+    def distance(self, other: "_Group") -> int:
+        """Columns between the first ones of two groups."""
+        return abs(min(self.columns.values()) - min(other.columns.values()))
+
 
 def group_columns(
     path: Path, names: Sequence[ColumnName], paths: Sequence[Sequence[str]], texts: Container[int], *, angles: bool
@@ -101,14 +105,18 @@ def _pair(
 ) -> tuple[BodyColumns, ...]:
     """Positions and rotations of the same body; those of the only body may have different names.
 
+    Of several positions of a name, the one beside a rotation belongs to it: others are those of markers.
     `valid` are columns and the names of their bodies; one without a body that is there counts for all.
     """
     pairs = [(place, turn) for place, turn in zip(places, turns, strict=False) if place.name == turn.name]
     if len(places) == len(turns) == 1:
         pairs = [(places[0], turns[0])]
     elif len(pairs) < max(len(places), len(turns)):
-        by_name = {turn.name: turn for turn in turns}
-        pairs = [(place, by_name[place.name]) for place in places if place.name in by_name]
+        pairs, free = [], list(places)
+        for turn in turns:
+            if same := [place for place in free if place.name == turn.name]:
+                pairs.append((min(same, key=turn.distance), turn))
+                free.remove(pairs[-1][0])
     known = {place.name or turn.name for place, turn in pairs}
     return tuple(
         BodyColumns(

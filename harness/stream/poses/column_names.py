@@ -21,7 +21,7 @@ _TIME_ORDER = ("measured", "stamp", "time", "timestamp", "received", "date")
 _FRAME = {"frame", "framenumber", "index", "idx", "seq", "sample", "framenum", "number"}
 _BODY = {
     *("station", "body", "name", "object", "tracker", "sensor", "device", "id", "target", "tool", "child", "segment"),
-    "serial",
+    *("serial", "sta", "stn", "channel", "receiver", "geometry"),
 }
 _POSITION = {"p", "pos", "position", "trans", "translation", "location", "loc", "xyz", "origin"}
 _ROTATION = {"q", "quat", "quaternion", "orientation", "orient", "rotation", "rot", "attitude", "ori", "qua"}

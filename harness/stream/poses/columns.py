@@ -88,7 +88,8 @@ def find_columns(head: TableHead, names: Sequence[str] | None = None, *, angles:
     above = [_spread(row) for row in _context(rows[:best], _program(facts))]
     cells: list[tuple[str, ...]] = [(*(row[c] for row in above), rows[best][c]) for c in range(head.columns)]
     if _program(facts) == "Qualisys":
-        cells = _name_bodies(rows[best])
+        listed = next((row[1:] for row in head.header if row[0].lower() == "body_names"), ())
+        cells = _name_bodies(rows[best], listed)
     units = rows[best + 1] if best + 1 < len(rows) else ("",) * head.columns
     return _from_names(head, cells, "the header's names", facts, units, angles=angles)
 
@@ -118,12 +119,15 @@ def _context(rows: Sequence[tuple[str, ...]], program: str) -> list[tuple[str, .
     return kept
 
 
-def _name_bodies(row: Sequence[str]) -> list[tuple[str, ...]]:
-    """The cells of Qualisys' header, in which X alone has the name of the body before it, with the name above."""
-    out, body = list[tuple[str, ...]](), ""
+def _name_bodies(row: Sequence[str], listed: Sequence[str]) -> list[tuple[str, ...]]:
+    """The cells of Qualisys' header with the name of the body above: it stands before X alone, or the names are listed.
+
+    Older files have the list alone.
+    """
+    out, body, names = list[tuple[str, ...]](), "", iter(listed)
     for cell in row:
         name, _, last = cell.rpartition(" ")
-        body, own = (name, last) if last == "X" else (body, cell)
+        body, own = (name or next(names, ""), last) if last == "X" else (body, cell)
         out.append((body, own))
     return out
 

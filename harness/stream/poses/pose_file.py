@@ -173,13 +173,9 @@ def _read_matrices(head: TableHead, options: PoseFileOptions) -> PoseLog:
 def _body_names(path: Path, columns: TableColumns, words: tuple[str, ...]) -> list[str]:
     """Names of the bodies, each another."""
     if columns.body is not None:
-        return [f"{float(word):g}" if _is_number(word) else word or path.stem for word in words]
+        return [re.sub(r"^(\d+)\.0*$", r"\1", word) or path.stem for word in words]
     names = [body.name for body in columns.bodies]
     if names == [""]:
         return [path.stem]
     numbered = [name or f"body{n}" for n, name in enumerate(names, 1)]
     return [name if numbered.count(name) == 1 else f"{name}_{n}" for n, name in enumerate(numbered, 1)]
-
-
-def _is_number(word: str) -> bool:
-    return bool(re.fullmatch(r"\d+\.?\d*", word))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.core.arrays import Floats, freeze
+from harness.core.arrays import Bools, Floats, freeze
 from harness.errors import BadInput, UnknownName
 
 _NORM_TOLERANCE = 1e-6
@@ -54,6 +54,12 @@ class BodyPoses:
             raise BadInput(f"Body {self.name!r}: times that do not increase.", "Sort the poses and leave doubles out.")
         if (np.abs(np.linalg.norm(self.quaternions, axis=1) - 1.0) > _NORM_TOLERANCE).any():
             raise BadInput(f"Body {self.name!r}: quaternions with another norm than 1.", "Normalise them.")
+
+    @property
+    def repeats(self) -> Bools:
+        """(N,) whether a pose has exactly the numbers of the one before: the source had no new one."""
+        poses = np.concatenate([self.positions_m, self.quaternions], axis=1)
+        return np.append(False, (np.diff(poses, axis=0) == 0.0).all(axis=1))
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ class BodyStatistics:
     poses: int
     duration_s: float
     rate_hz: float | None
-    """Inverse of the median step; None for one pose."""
+    """Inverse of the mean of the steps that are no gaps; None for one pose."""
     step_ms: tuple[float, float] | None
     """Steps between which nine tenths of all lie [ms]; None for one pose."""
     gaps: int
@@ -40,19 +40,16 @@ def measure_sampling(body: BodyPoses) -> BodyStatistics:
     size = float(extent[0]), float(extent[1]), float(extent[2])
     if not len(steps_s):
         return BodyStatistics(body.name, 1, 0.0, None, None, 0, 0.0, 0.0, size)
-    same = (np.diff(body.positions_m, axis=0) == 0.0).all(axis=1) & (np.diff(body.quaternions, axis=0) == 0.0).all(
-        axis=1
-    )
-    median_s = float(np.median(steps_s))
+    gap = steps_s >= GAP_STEPS * np.median(steps_s)
     low, high = (1e3 * float(step) for step in np.percentile(steps_s, [5, 95]))
     return BodyStatistics(
         body.name,
         len(body.times_s),
         float(body.times_s[-1] - body.times_s[0]),
-        1.0 / median_s,
+        1.0 / float(steps_s[~gap].mean()),
         (low, high),
-        int(np.count_nonzero(steps_s >= GAP_STEPS * median_s)),
+        int(np.count_nonzero(gap)),
         float(steps_s.max()),
-        float(np.mean(np.append(False, same))),
+        float(np.mean(body.repeats)),
         size,
     )

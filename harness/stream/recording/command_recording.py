@@ -22,7 +22,7 @@ from harness.stream.polhemus.driver.exchange import Answer, exchange, read_wire_
 from harness.stream.polhemus.driver.transport import LineLost
 from harness.stream.recording.blocks import RECEIVED
 from harness.stream.recording.recorder import PROGRESS_INTERVAL_S
-from harness.stream.recording.recording import RecordingWriter
+from harness.stream.recording.recording_writer import RecordingWriter
 
 _SHOWN_BYTES = 120
 """Bytes of an answer that are printed; the recording has all."""

@@ -20,9 +20,10 @@ from harness.errors import BadFile
 from harness.stream.frame import TrackerFrame
 from harness.stream.line_events import EventCounter
 from harness.stream.ports import TrackerConfig, open_tracker_at
-from harness.stream.recording.pose_writer import open_writer, read_stretch_marks
+from harness.stream.recording.pose_writer import open_writer
 from harness.stream.recording.recorder import tracked_text
-from harness.stream.recording.recording import RecordingWriter
+from harness.stream.recording.recording import read_marks
+from harness.stream.recording.recording_writer import RecordingWriter
 from harness.stream.tracker import OpenTracker
 
 WATCHED_S = 2.0
@@ -52,7 +53,7 @@ def finished_stretches(path: Path) -> set[str]:
         return set()
     return {
         str(begin["stretch"])
-        for begin, end in pairwise(read_stretch_marks(path))
+        for begin, end in pairwise(read_marks(path))
         if begin.get("stretch") and end.get("stretch") == "" and end.get("finished") == begin["stretch"]
     }
 

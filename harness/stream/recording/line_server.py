@@ -30,7 +30,7 @@ from harness.stream.polhemus.driver.transport import LineLost, SelectTransport
 from harness.stream.polhemus.emulator.pty_port import ClientPty, check_link_is_free
 from harness.stream.recording.blocks import RECEIVED, SENT
 from harness.stream.recording.recorder import PROGRESS_INTERVAL_S
-from harness.stream.recording.recording import RecordingWriter
+from harness.stream.recording.recording_writer import RecordingWriter
 
 SERVE_TIMING = DriverTiming(answer_s=0.3, quiet_s=0.05)
 """Shorter waits than the driver's: the program waits meanwhile [choice]."""

@@ -7,7 +7,7 @@ block are those of its first row. A damaged or cut block costs its rows alone.
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from harness.stream.poses.number_table import EXPECTED_FILE, read_head
 from harness.stream.poses.options import PoseFileOptions
 from harness.stream.poses.pose_file import read_pose_log
 from harness.stream.poses.pose_log import BodyPoses, FileFinding, PoseLog
+from harness.stream.recording.block_content import PLAN_FILE, block_content
 from harness.stream.recording.blocks import (
     BODIES,
     MARK,
@@ -38,7 +39,7 @@ from harness.stream.recording.blocks import (
     read_blocks,
     read_version,
 )
-from harness.stream.recording.recording import MAX_BYTES, PLAN_FILE, Recording, describe_damage
+from harness.stream.recording.recording import MAX_BYTES, describe_damage
 
 EXPECTED_POSES = "a recording of poses by `harness record`"
 POSE_ROW = np.dtype([("body", "<u4"), ("time_s", "<f8"), ("position_m", "<f8", 3), ("quaternion", "<f8", 4)])
@@ -113,15 +114,21 @@ def write_pose_recording(
         raise BadFile(path, f"it cannot be written ({error.strerror})", "a recording", "Choose another.") from error
 
 
+def encode_bodies(
+    names: Sequence[str], source: str, clock: str, start_unix_s: float | None, findings: Iterable[FileFinding]
+) -> bytes:
+    """The payload of a block `body`."""
+    content = {"bodies": names, "source": source, "clock": clock, "start_unix_s": start_unix_s}
+    return json.dumps({**content, "findings": [asdict(finding) for finding in findings]}).encode()
+
+
 def _encode(log: PoseLog, note: Mapping[str, Any], marks: Sequence[tuple[float, str]]) -> Iterator[bytes]:
     def block(kind: str, at_s: float, payload: bytes) -> bytes:
         return encode_block(RecordingBlock(kind, at_s, (log.start_unix_s or 0.0) + at_s, payload))
 
-    findings = [asdict(finding) for finding in log.findings]
-    content = {"bodies": log.names, "source": log.source, "clock": log.clock, "start_unix_s": log.start_unix_s}
     yield POSES_HEADER
     yield block(NOTE, 0.0, json.dumps(note, default=str).encode())
-    yield block(BODIES, 0.0, json.dumps({**content, "findings": findings}).encode())
+    yield block(BODIES, 0.0, encode_bodies(log.names, log.source, log.clock, log.start_unix_s, log.findings))
     rows = _rows(log)
     begins = np.searchsorted(rows["time_s"], [at_s for at_s, _ in marks]).tolist()
     pending = list(zip(begins, marks, strict=True))
@@ -149,17 +156,17 @@ def _rows(log: PoseLog) -> NDArray[Any]:
 def read_pose_recording(path: Path) -> PoseRecording:
     """Read a recording of poses, whatever part of it is damaged. Raises BadFile where no pose is left."""
     data = read_input_file(path, EXPECTED_POSES, MAX_BYTES)
-    parser, damage = Recording(path, b""), list[str]()
+    damage = list[str]()
     head: dict[str, Any] = {}
     note: dict[str, Any] = {}
     marks, parts = list[tuple[float, str]](), list[NDArray[Any]]()
     for block in describe_damage(read_blocks(data, len(POSES_HEADER)), damage):
         if block.kind == NOTE:
-            note = parser.parse_json(block)
+            note = block_content(path, block)
         elif block.kind == BODIES:
-            head = parser.parse_json(block)
+            head = block_content(path, block)
         elif block.kind == MARK:
-            marks.append((block.monotonic_s, str(parser.parse_json(block).get("stretch", ""))))
+            marks.append((block.monotonic_s, str(block_content(path, block).get("stretch", ""))))
         elif block.kind == POSES:
             if len(block.payload) % POSE_ROW.itemsize:
                 raise BadFile(path, "a block of poses that ends within a row", EXPECTED_POSES, "Record again.")

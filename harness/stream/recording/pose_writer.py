@@ -2,18 +2,17 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from harness.core.input_file import open_input_file
 from harness.errors import BadFile
 from harness.stream.frame import TrackerFrame
 from harness.stream.line_events import LineEvent, TrackedBodies
 from harness.stream.ports import TrackerConfig
 from harness.stream.poses.pose_log import FileFinding
+from harness.stream.recording.block_content import PLAN_FILE, block_content, note_values
 from harness.stream.recording.blocks import (
     BODIES,
     EVENT,
@@ -25,16 +24,9 @@ from harness.stream.recording.blocks import (
     RecordingBlock,
     read_version,
 )
-from harness.stream.recording.pose_recording import EXPECTED_POSES, POSE_ROW, is_pose_recording
-from harness.stream.recording.recording import (
-    MAX_BYTES,
-    PLAN_FILE,
-    Recording,
-    RecordingWriter,
-    note_values,
-    read_marks,
-    whole_blocks,
-)
+from harness.stream.recording.pose_recording import EXPECTED_POSES, POSE_ROW, encode_bodies
+from harness.stream.recording.recording import whole_blocks
+from harness.stream.recording.recording_writer import RecordingWriter
 from harness.stream.vrpn import VrpnConfig
 
 
@@ -68,9 +60,8 @@ class PoseRecordingWriter(RecordingWriter):
             return
         self._start_unix_s = bodies.start_unix_s
         findings = [FileFinding(name, *told, assumed=True) for name, told in bodies.assumed.items()]
-        content: dict[str, Any] = {"bodies": bodies.names, "source": bodies.source, "clock": bodies.clock}
-        content |= {"start_unix_s": bodies.start_unix_s, "findings": [asdict(finding) for finding in findings]}
-        self._append(self._block(BODIES, json.dumps(content).encode(), 0.0))
+        content = encode_bodies(bodies.names, bodies.source, bodies.clock, bodies.start_unix_s, findings)
+        self._append(self._block(BODIES, content, 0.0))
 
     def on_frame(self, frame: TrackerFrame) -> None:
         """Write the poses of a frame that have a place and a direction."""
@@ -116,12 +107,12 @@ class PoseRecordingWriter(RecordingWriter):
         head = file.read(len(POSES_HEADER))
         if read_version(head) != POSES_VERSION and head != POSES_HEADER[: len(head)]:
             raise BadFile(self.path, "no recording of poses", EXPECTED_POSES, "Record into another file.")
-        parser, notes = Recording(self.path, b""), list[RecordingBlock]()
+        notes = list[RecordingBlock]()
         for block in whole_blocks(file):
             if block.kind == NOTE:
                 notes.append(block)
             elif block.kind == BODIES:
-                content = parser.parse_json(block)
+                content = block_content(self.path, block)
                 self._stations = tuple(map(str, content.get("bodies") or ()))
                 start_s = content.get("start_unix_s")
                 if not isinstance(start_s, float):
@@ -131,18 +122,9 @@ class PoseRecordingWriter(RecordingWriter):
             elif block.kind == POSES and len(block.payload) % POSE_ROW.itemsize == 0:
                 rows = np.frombuffer(block.payload, dtype=POSE_ROW)
                 self._latest_s.update(zip(rows["body"].tolist(), rows["time_s"].tolist(), strict=True))
-        self._check_plan(note_values(parser, notes, PLAN_FILE))
+        self._check_plan(note_values(self.path, notes, PLAN_FILE))
 
 
 def open_writer(path: Path, note: Mapping[str, Any], config: TrackerConfig) -> RecordingWriter:
     """The writer of a recording of such a tracker: of poses for VRPN, else of bytes. Raises BadFile."""
     return PoseRecordingWriter(path, note) if isinstance(config, VrpnConfig) else RecordingWriter(path, note)
-
-
-def read_stretch_marks(path: Path) -> list[dict[str, Any]]:
-    """What the marks of a recording say, of bytes or of poses, in the order of the file. Raises BadFile."""
-    if not is_pose_recording(path):
-        return read_marks(path)
-    with open_input_file(path, EXPECTED_POSES, MAX_BYTES) as file:
-        file.seek(len(POSES_HEADER))
-        return Recording(path, b"").timed_contents(MARK, whole_blocks(file))

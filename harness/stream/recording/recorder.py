@@ -16,7 +16,7 @@ from harness.stream.polhemus.codec.reader import WireFormat
 from harness.stream.ports import TrackerConfig, open_tracker_at
 from harness.stream.recording.blocks import POSES, RECEIVED
 from harness.stream.recording.pose_writer import PoseRecordingWriter
-from harness.stream.recording.recording import RecordingWriter
+from harness.stream.recording.recording_writer import RecordingWriter
 from harness.stream.tracker import OpenTracker
 
 

@@ -17,8 +17,9 @@ import numpy as np
 from harness.errors import BadFile, BadInput
 from harness.stream.frame import TrackerFrame
 from harness.stream.polhemus.codec.reader import ByteCapture, ContinuousFrameReader, WireFormat
+from harness.stream.recording.block_content import EXPECTED_FILE, wire_format_of
 from harness.stream.recording.blocks import CONFIGURED, RECEIVED
-from harness.stream.recording.recording import EXPECTED_FILE, Recording, read_recording
+from harness.stream.recording.recording import Recording, read_recording
 
 CHUNKS_PER_BATCH = 1000
 """Chunks that are decoded together where the replay does not wait for the clock."""
@@ -167,7 +168,7 @@ class RecordingStream:
             elif block.kind == CONFIGURED:
                 yield from decode()
                 yield from due(reader.finish())
-                wire = self.recording.format_of(block)
+                wire = wire_format_of(self.path, block)
                 if block.monotonic_s + shift_s < now_s:  # recorded after a restart of the computer
                     pause_s = max(block.wall_s - wall_s, 1.0 / wire.rate_hz)
                     shift_s = now_s + pause_s - block.monotonic_s

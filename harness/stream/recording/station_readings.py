@@ -21,8 +21,9 @@ from harness.stream.polhemus.codec.decoder import Garbage, RecordRun
 from harness.stream.polhemus.codec.reader import ReadingsDecoder, WireFormat, make_decoder
 from harness.stream.polhemus.codec.readings import Readings, concatenate_readings
 from harness.stream.poses.pose_log import BodyPoses
+from harness.stream.recording.block_content import EXPECTED_FILE, block_content, wire_format_of
 from harness.stream.recording.blocks import CONFIGURED, MARK, NOTE, RECEIVED, RecordingBlock, scan_blocks
-from harness.stream.recording.recording import EXPECTED_FILE, Recording, describe_damage, open_recording
+from harness.stream.recording.recording import describe_damage, open_recording
 
 BLOCK_S = 600.0
 """Length of a piece [s]: ten minutes of twelve stations at 120 Hz take some 90 MB."""
@@ -112,13 +113,12 @@ class CaptureReader:
         """The latest note on the origin of the recording that was read so far."""
         self.damage: list[str] = []
         """Descriptions of the damaged or truncated parts that were read so far."""
-        self._recording = Recording(self.path, b"")  # its parsers of blocks
         with closing(self._read_blocks()) as entries:
             first = next((block for block in entries if block.kind == CONFIGURED), None)
         if first is None:
             problem = "the device was never configured in it" + "".join(f" ({text})" for text in self.damage)
             raise BadFile(self.path, problem, EXPECTED_FILE, "It contains no readings.")
-        self.wire = self._recording.format_of(first)
+        self.wire = wire_format_of(self.path, first)
         """The wire format of the first configuration."""
 
     def blocks(self, block_s: float = BLOCK_S) -> Iterator[CaptureBlock]:
@@ -131,9 +131,9 @@ class CaptureReader:
                 yield from session.take(stretch, at_end=block.kind == CONFIGURED)
                 begin_s = block.monotonic_s
             if block.kind == MARK:
-                stretch = str(self._recording.parse_json(block).get("stretch", ""))
+                stretch = str(block_content(self.path, block).get("stretch", ""))
             elif block.kind == CONFIGURED:
-                session = _Session(self._same_stations(self._recording.format_of(block)), number, block.monotonic_s)
+                session = _Session(self._same_stations(wire_format_of(self.path, block)), number, block.monotonic_s)
                 begin_s, number = block.monotonic_s, number + 1
             elif block.kind == RECEIVED and session is not None:
                 session.add(block.payload, block.monotonic_s)
@@ -153,7 +153,7 @@ class CaptureReader:
         with open_recording(self.path) as file:
             for entry in describe_damage(scan_blocks(file), self.damage):
                 if entry.kind == NOTE:
-                    self.note = self._recording.parse_json(entry)
+                    self.note = block_content(self.path, entry)
                 yield entry
 
 

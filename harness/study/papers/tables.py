@@ -112,7 +112,6 @@ def mean_bars(
     groups: Mapping[str, Mapping[str, Mapping[str, float]]],
     *,
     caption: str = "",
-    horizontal: bool = False,
     published: Mapping[str, tuple[float | None, ...]] | None = None,
 ) -> BarChart:
     """Bar chart of group -> column -> errors by unit.
@@ -129,7 +128,6 @@ def mean_bars(
         spread={column: tuple(sd for _, sd in each) for column, each in figures.items()},
         published=dict(published or {}),
         caption=f"{caption} {number_of_units(errors for each in groups.values() for errors in each.values())}".strip(),
-        horizontal=horizontal,
     )
 
 

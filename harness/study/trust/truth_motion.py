@@ -145,9 +145,7 @@ def truth_of_capture(other: CaptureReadings, stations: Sequence[str]) -> TruthMo
     bodies = {}
     for name, readings in other.readings.items():
         poses = measured_poses(readings)
-        rows = np.flatnonzero(poses.valid & np.isfinite(poses.measured_s))
-        highest_s = np.maximum.accumulate(np.append(-np.inf, poses.measured_s[rows]))[:-1]
-        rows = rows[poses.measured_s[rows] > highest_s]
+        rows = poses.rising_rows()
         bodies[name] = TruthPoses(poses.measured_s[rows], poses.position_m[rows], poses.tracker_from_station[rows])
     lost = (f"{other.path.name}: {text}" for text in (*other.left_out, *other.damage))
     note = "Scale, heading and clocks are those relative to the other tracker, and are not compared with a preset."

@@ -94,7 +94,7 @@ def validate_capture(
 ) -> Validation:
     """Register a capture with its reference and compare the result with the preset or an earlier unit file.
 
-    BadInput as `measure.registration.register`, and for a station that the reference does not carry.
+    BadInput and NotComparable as `register_poses`, and for a station that the reference does not carry.
     """
     readings, wire = capture.readings, capture.wire
     poses, unseen = _comparable_poses(capture, truth)

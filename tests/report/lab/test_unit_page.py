@@ -156,8 +156,14 @@ def test_the_description_has_numbers_that_were_measured_only(unit_with_faults: U
         assert f"{words} {1e3 * min(figures):.2f} to {1e3 * max(figures):.2f} mm" in spread
     drift = "components.drift"
     assert numbers_in_order(noise, *(values[key] for key in (WHITE, f"{drift}.position_m", f"{drift}.correlation_s")))
+    assert "which lasts" in noise
+    rows = [
+        replace(row, measured=Interval(0.0, 0.0, 1e-5)) if row.key == f"{drift}.position_m" else row
+        for row in unit_with_faults.parameters
+    ]
+    assert "which lasts" not in description(replace(unit_with_faults, parameters=tuple(rows)))[1]
     assert excursions == f"A station has {values[RATE].removesuffix(' /min')} excursions a minute."
-    assert numbers_in_order(shares, *(values[f"components.{name}.share"] for name in ("echo", "dropout")), "0 %")
+    assert numbers_in_order(shares, *(values[f"components.{name}.share"] for name in ("echo", "dropout")), "0 %", "0 %")
     assert timing.endswith(f"{values['components.clock.drift_ppm']} fast.")
     assert description(bare) == []
 

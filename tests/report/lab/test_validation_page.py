@@ -139,6 +139,13 @@ def test_charts_have_both_offsets_and_the_errors_of_each_station(late_capture: V
     expected = [x for one in offsets for x in ([1e3 * one.low, 1e3 * one.high], [1e3 * one.value])]
     assert [points(line)[0].tolist() for line in axes.lines] == [pytest.approx(each) for each in expected]
     assert [text.get_text() for text in axes.get_yticklabels()] == ["by orientation", "by position"]
+    exact = {
+        f"time_offset_{of}_s": Interval(-0.3, -0.3 - half_s, -0.3 + half_s)
+        for of, half_s in (("orientation", 2e-5), ("position", 4e-6))
+    }
+    near = replace(late_capture, numbers={**late_capture.numbers, **exact})
+    (axes,) = drawn_figures(lambda: draw_page(validation_page(near, {}, "")))["offsets"].axes
+    assert "−300.00" in [text.get_text() for text in axes.get_xticklabels()]
     panels, stations = figures["residuals"].axes, list(late_capture.accuracy)
     assert len(panels) == 2 * len(stations)
     for n, one in enumerate(late_capture.residuals):

@@ -11,7 +11,8 @@ from harness.errors import BadFile
 from harness.stream.fastrak.driver import FastrakConfig
 from harness.stream.polhemus.codec.reader import WireFormat
 from harness.stream.recording.blocks import CONFIGURED, RECEIVED, encode_block, read_blocks
-from harness.stream.recording.recording import RecordingWriter, read_recording
+from harness.stream.recording.recording import read_recording
+from harness.stream.recording.recording_writer import RecordingWriter
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import CaptureReader, arrival_times_s
 from tests.stream.fastrak.bench import fastrak_bench, open_fastrak

@@ -15,6 +15,8 @@ from harness.stream.poses.column_names import ColumnName, parse_column_name
         ("Frame", ("frame", "", "", "")),
         ("child_frame_id", ("body", "", "", "")),
         ("station", ("body", "", "", "")),
+        ("Sta", ("body", "", "", "")),
+        ("geometry_id", ("body", "", "", "")),
         ("p_RS_R_x [m]", ("position", "x", "", "m")),
         ("x_mm", ("position", "x", "", "mm")),
         ("tx [in]", ("position", "x", "", "in")),

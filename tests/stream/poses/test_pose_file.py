@@ -355,6 +355,35 @@ def test_a_name_that_is_written_in_two_ways_is_one_body(tmp_path: Path) -> None:
     assert_motion(log.bodies[0])
 
 
+def test_numbers_of_bodies_keep_all_digits(tmp_path: Path) -> None:
+    def content(first: str) -> str:
+        ids = (first, "8700340.00")
+        return rows(lambda n: f"{TIMES_S[n]:.4f},{ids[n % 2]},{pose(n)}", [f"t,tool,{HEADER[2:]}"])
+
+    assert read_pose_log(write(tmp_path / "a.csv", content("8700339"))).names == ("8700339", "8700340")
+    assert read_pose_log(write(tmp_path / "b.csv", content("0.500"))).names == ("0.500", "8700340")
+
+
+def test_positions_of_markers_are_no_bodies(tmp_path: Path) -> None:
+    """NDI's program writes those of each tool's markers behind its pose, under the same names."""
+    pose_names = "Q0,Qx,Qy,Qz,Tx,Ty,Tz"
+
+    def tool(row: int, markers: int) -> str:
+        place = 1e3 * POSITIONS_M[row]
+        return f"{numbers([*QUATERNIONS[row], *place])}" + f",OK,{numbers(place + 50.0)}" * markers
+
+    apart = ",".join(f"Port {tool},Frame,State,{pose_names}" + ",State,Tx,Ty,Tz" * 3 for tool in (1, 2))
+    close = f"Frame,{pose_names},{pose_names},State,Tx,Ty,Tz"
+    for content in (
+        rows(lambda n: ",".join(f"449A,{n},OK,{tool(row, 3)}" for row in (n, COUNT - 1 - n)), [apart]),
+        rows(lambda n: f"{n},{tool(n, 0)},{tool(COUNT - 1 - n, 1)}", [close]),
+    ):
+        log = read_pose_log(write(tmp_path / "a.csv", content), PoseFileOptions(rate_hz=RATE_HZ))
+        assert log.names == ("body1", "body2")
+        assert_motion(log.bodies[0])
+        assert_motion(BodyPoses("2", TIMES_S, log.bodies[1].positions_m[::-1], log.bodies[1].quaternions[::-1]))
+
+
 def test_a_column_of_ever_new_words_names_no_bodies(tmp_path: Path) -> None:
     content = rows(lambda n: f"{TIMES_S[n % COUNT]:.4f},word{n},{pose(n % COUNT)}", [f"t,name,{HEADER[2:]}"], 1001)
     with pytest.raises(BadFile, match="more than 1000 different words in the column of names"):
@@ -386,6 +415,8 @@ def test_qualisys_is_known(tmp_path: Path) -> None:
     assert finding(log, "not read").value.startswith(
         "marker rig/Roll, marker rig/Pitch, marker rig/Yaw, marker rig/Res"
     )
+    listed = qualisys().replace("marker rig X", "X").replace("hand X", "X")
+    assert read_pose_log(write(tmp_path / "c.tsv", listed)).names == ("marker rig", "hand")
     untimed = qualisys().replace("Frame\tTime\t", "Frame\tCounter\t")
     assert read_pose_log(write(tmp_path / "b.tsv", untimed)).clock == "samples counted at 50 Hz"
 

@@ -69,6 +69,13 @@ def test_rates_gaps_and_repeats_are_measured() -> None:
     assert found.extent_m == pytest.approx(np.ptp(POSITIONS_M[rows], axis=0))
 
 
+def test_the_rate_is_that_of_times_that_are_printed_coarsely() -> None:
+    times_s = np.delete(np.round(np.arange(600) / 60.0, 3), slice(100, 200))  # steps of 16 and 17 ms, and a pause
+    found = measure_sampling(BodyPoses("a", times_s, np.zeros((500, 3)), np.tile(TURN, (500, 1))))
+    assert found.rate_hz == pytest.approx(60.0, abs=0.01)
+    assert found.gaps == 1
+
+
 def test_one_pose_has_no_rate() -> None:
     found = measure_sampling(BodyPoses("a", [0.0], np.zeros((1, 3)), TURN))  # type: ignore[arg-type]
     assert (found.poses, found.rate_hz, found.step_ms, found.gaps) == (1, None, None, 0)

@@ -16,7 +16,8 @@ from harness.stream.is900.driver.config import DriverConfig
 from harness.stream.is900.driver.is900 import Is900
 from harness.stream.polhemus.emulator.pty_port import ABSENT_S, MAX_WAITING_BYTES, ClientPty
 from harness.stream.recording.line_server import serve_line
-from harness.stream.recording.recording import RecordingWriter, read_recording
+from harness.stream.recording.recording import read_recording
+from harness.stream.recording.recording_writer import RecordingWriter
 from harness.stream.recording.replay import RecordingStream
 
 

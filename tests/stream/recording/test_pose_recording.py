@@ -17,7 +17,8 @@ from harness.stream.recording.pose_recording import (
     read_pose_recording,
     write_pose_recording,
 )
-from harness.stream.recording.recording import RecordingWriter, read_recording
+from harness.stream.recording.recording import read_recording
+from harness.stream.recording.recording_writer import RecordingWriter
 from harness.stream.recording.station_readings import CaptureReader
 from tests.stream.poses.pose_files import COUNT, POSITIONS_M, QUATERNIONS, SAMPLES, TIMES_S, write
 from tests.stream.recording.test_replay import write_capture

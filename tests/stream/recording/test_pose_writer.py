@@ -14,9 +14,10 @@ from harness.stream.polhemus.codec.reader import WireFormat
 from harness.stream.poses.pose_log import FileFinding
 from harness.stream.recording.guided_capture import finished_stretches
 from harness.stream.recording.pose_recording import read_pose_recording
-from harness.stream.recording.pose_writer import PoseRecordingWriter, open_writer, read_stretch_marks
+from harness.stream.recording.pose_writer import PoseRecordingWriter, open_writer
 from harness.stream.recording.recorder import RecordingSwitch
-from harness.stream.recording.recording import RecordingWriter
+from harness.stream.recording.recording import read_marks
+from harness.stream.recording.recording_writer import RecordingWriter
 from harness.stream.vrpn.client import VrpnConfig
 
 START_S = 1_700_000_000.25
@@ -86,7 +87,7 @@ def test_a_recording_goes_on_by_the_trackers_clock(tmp_path: Path) -> None:
     (first_s, _), (end_s, _), (slow_s, _) = read_pose_recording(path).marks
     assert 0.0 < first_s < 1e-300
     assert 0.5 < end_s == slow_s < 0.5 + 1e-15
-    assert [mark["stretch"] for mark in read_stretch_marks(path)] == ["static", "", "slow"]
+    assert [mark["stretch"] for mark in read_marks(path)] == ["static", "", "slow"]
     assert finished_stretches(path) == {"static"}
 
 

@@ -1,6 +1,6 @@
 """A recording that is started and stopped while a device runs: each part can be replayed alone."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -13,7 +13,8 @@ from harness.stream.frame import TrackerFrame
 from harness.stream.line_events import LineEvent
 from harness.stream.recording import recorder
 from harness.stream.recording.recorder import RecordingSwitch
-from harness.stream.recording.recording import RecordingWriter, read_recording
+from harness.stream.recording.recording import read_recording
+from harness.stream.recording.recording_writer import RecordingWriter
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.vrpn import VrpnConfig
 
@@ -60,7 +61,7 @@ class _Device:
 
     identification, station_list, setup_note, counts = "a tracker", "1 head", "", {"records": 100}
 
-    def __init__(self, frames: list[TrackerFrame]) -> None:
+    def __init__(self, frames: Sequence[TrackerFrame]) -> None:
         self.left = iter(frames)
 
     def __iter__(self) -> Iterator[TrackerFrame]:

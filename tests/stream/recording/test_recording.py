@@ -33,7 +33,8 @@ from harness.stream.recording.blocks import (
     encode_block,
     read_blocks,
 )
-from harness.stream.recording.recording import Recording, RecordingWriter, read_marks, read_recording, record_capture
+from harness.stream.recording.recording import Recording, read_marks, read_recording
+from harness.stream.recording.recording_writer import RecordingWriter, record_capture
 from tests.stream.wire import FOUR
 
 ENTRIES = [
@@ -290,7 +291,7 @@ def test_a_full_disk_is_reported() -> None:
 ENDLESS_WRITER = """
 import sys
 from harness.stream.polhemus.codec.reader import WireFormat
-from harness.stream.recording.recording import RecordingWriter
+from harness.stream.recording.recording_writer import RecordingWriter
 writer = RecordingWriter(sys.argv[1], {"source": "a test"})
 writer.on_configured(WireFormat(("head",), 40.0), 0.0, 0.0)
 for count in range(10**9):
@@ -348,7 +349,7 @@ def test_a_simulated_line_is_recorded_chunk_by_chunk_with_its_marks(
     marks = ((0.0, "static"), (9.5, "slow"), (99.0, "never"))
     contents = []
     for name, per_write in (("a.rec", 4096), ("b.rec", 3)):
-        monkeypatch.setattr("harness.stream.recording.recording._CHUNKS_PER_WRITE", per_write)
+        monkeypatch.setattr("harness.stream.recording.recording_writer._CHUNKS_PER_WRITE", per_write)
         writer = record_capture(tmp_path / name, FOUR, capture, {}, marks=marks)
         assert (writer.counts[RECEIVED], writer.counts[MARK]) == (len(capture.data), 2)
         contents.append((tmp_path / name).read_bytes())

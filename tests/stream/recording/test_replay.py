@@ -26,7 +26,8 @@ from harness.stream.recording.blocks import (
     RecordingBlock,
     encode_block,
 )
-from harness.stream.recording.recording import Recording, RecordingWriter, read_recording, record_capture
+from harness.stream.recording.recording import Recording, read_recording
+from harness.stream.recording.recording_writer import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream, ReplaySpeed, parse_speed, wait_for_enter
 from harness.testing.stream_checks import check_stream
 from tests.stream.wire import FOUR, RATE_HZ, RECORD, decode_frames, device_bytes, frames_equal, in_chunks, stamps_s

@@ -15,7 +15,8 @@ from harness.errors import BadFile, HarnessError
 from harness.stream.polhemus.codec.reader import WireFormat
 from harness.stream.polhemus.codec.records import RecordValues, encode_records
 from harness.stream.recording.blocks import read_blocks
-from harness.stream.recording.recording import RecordingWriter, read_recording
+from harness.stream.recording.recording import read_recording
+from harness.stream.recording.recording_writer import RecordingWriter
 from harness.stream.recording.replay import RecordingStream
 from harness.stream.recording.station_readings import CaptureBlock, CaptureReader, StationReadings
 

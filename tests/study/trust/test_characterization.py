@@ -2,15 +2,19 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from harness.bench.lab.captures import planted_capture
+from harness.core import rotations
 from harness.measure import UnitFile
-from harness.stream.recording import CaptureReader
+from harness.stream import BodyPoses, PoseLog
+from harness.stream.recording import CaptureReader, PoseRecording
 from harness.study.trust.characterization import (
     DEFAULT_KEPT,
     Characterization,
     characterize_capture,
+    characterize_log,
     measured_numbers,
     preset_components,
 )
@@ -84,3 +88,22 @@ def test_the_needed_time_follows_the_rate(white: Characterization) -> None:
     rate = white.profile.parameters["components.excursion.onsets_per_min"].value
     (advice,) = white.report.advice
     assert advice.needed_minutes == pytest.approx(97 / (6 * rate))
+
+
+def test_a_body_with_gaps_has_no_spectrum(tmp_path: Path, rng: np.random.Generator) -> None:
+    """Every fiftieth pose is missing, so that no 10 s are without a gap."""
+    bodies = tuple(
+        BodyPoses(
+            name,
+            rows / 50.0,
+            0.001 * rng.normal(size=(len(rows), 3)),
+            rotations.exp(0.001 * rng.normal(size=(len(rows), 3))),
+        )
+        for name, rows in (("gaps", np.flatnonzero(np.arange(3000) % 50)), ("whole", np.arange(3000)))
+    )
+    log = PoseLog(bodies, "rest.csv")
+    path = tmp_path / "rest.csv"
+    path.write_text("poses")
+    report = characterize_log(PoseRecording(path, log, {})).report
+    assert [curve.station for curve in report.spectra] == ["whole"]
+    assert [curve.station for curve in report.allan_position] == ["gaps", "whole"]

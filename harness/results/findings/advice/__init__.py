@@ -5,24 +5,12 @@ from typing import TYPE_CHECKING
 from harness.core.door import lazy_names
 
 if TYPE_CHECKING:
-    from harness.results.findings.advice.placement_advice import (
-        Effort,
-        HalvingRound,
-        PlacementAdvice,
-        SecondChoice,
-        SecondMethod,
-        SetError,
-        SizeStep,
-    )
+    from harness.results.findings.advice.placement_advice import Effort as Effort
+    from harness.results.findings.advice.placement_advice import HalvingRound as HalvingRound
+    from harness.results.findings.advice.placement_advice import PlacementAdvice as PlacementAdvice
+    from harness.results.findings.advice.placement_advice import SecondChoice as SecondChoice
+    from harness.results.findings.advice.placement_advice import SecondMethod as SecondMethod
+    from harness.results.findings.advice.placement_advice import SetError as SetError
+    from harness.results.findings.advice.placement_advice import SizeStep as SizeStep
 else:
     __getattr__, __dir__ = lazy_names(__name__)
-
-__all__ = [
-    "Effort",
-    "HalvingRound",
-    "PlacementAdvice",
-    "SecondChoice",
-    "SecondMethod",
-    "SetError",
-    "SizeStep",
-]

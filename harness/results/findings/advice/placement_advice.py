@@ -104,8 +104,3 @@ class SecondMethod:
     """One for each number of stations, the smallest first."""
     errors: tuple[SetError, ...] = ()
     """Errors of the sets under this method, on the clips on which they were compared."""
-
-    @property
-    def agrees(self) -> bool:
-        """Whether no chosen set is significantly worse under this method than another one."""
-        return not any(choice.worse for choice in self.choices)

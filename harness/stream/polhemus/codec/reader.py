@@ -1,7 +1,6 @@
 """The complete path from bytes to frames, without input or output. Every source of device bytes uses it."""
 
 from collections import Counter, deque
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -277,33 +276,6 @@ def make_decoder(wire: WireFormat) -> Decoder | DatagramDecoder:
     return Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)
 
 
-class CaptureStream:
-    """A `TrackerStream` over recorded bytes in memory."""
-
-    def __init__(self, wire: WireFormat, capture: ByteCapture) -> None:
-        self._wire, self._capture, self._closed = wire, capture, False
-
-    @property
-    def stations(self) -> tuple[str, ...]:
-        """Station names, in the order of the device's stations."""
-        return self._wire.stations
-
-    def __iter__(self) -> Iterator[TrackerFrame]:
-        reader = FrameReader(self._wire)
-        for frame in (*reader.feed_all(self._capture), *reader.finish()):
-            if self._closed:
-                return
-            yield frame
-
-    def close(self) -> None:
-        """End the iteration."""
-        self._closed = True
-
-
-SILENCE_PERIODS = 2.0
-"""Every unfinished frame is overdue after this many periods without a byte."""
-
-
 class ContinuousFrameReader:
     """Frames of consecutive sessions: host times strictly increase, and device time never steps back.
 
@@ -315,9 +287,8 @@ class ContinuousFrameReader:
         self.device_zero_s = 0.0
         """The value of `measured_s` at which the device's own clock is zero [s]."""
         self._reader: FrameReader | None = None
-        self._period_s = 0.0
-        self._last_byte_s = self._last_frame_s = -np.inf
-        """Host time of the last byte or configuration, and of the last frame [s]."""
+        self._last_frame_s = -np.inf
+        """Host time of the last frame [s]."""
         self._is_new = False
         """True until the first bytes after a configuration."""
         self._device_s = 0.0
@@ -339,11 +310,6 @@ class ContinuousFrameReader:
         """Reader of the present session; None before the first configuration."""
         return self._reader
 
-    @property
-    def silent_from_s(self) -> float:
-        """When every unfinished frame is overdue if no byte arrives before [s]."""
-        return self._last_byte_s + SILENCE_PERIODS * self._period_s
-
     def begin_session(self, wire: WireFormat, now_s: float) -> list[TrackerFrame]:
         """Start a session: later bytes have this format, and the device's clock starts at zero if `wire` says so.
 
@@ -351,8 +317,7 @@ class ContinuousFrameReader:
         """
         frames = self.finish()
         self._totals["sessions"] += 1
-        self._reader, self._period_s = FrameReader(wire, now_s if wire.zeroed else None), 1.0 / wire.rate_hz
-        self._last_byte_s, self._is_new = now_s, True
+        self._reader, self._is_new = FrameReader(wire, now_s if wire.zeroed else None), True
         return frames
 
     def feed(self, data: bytes, now_s: float) -> list[TrackerFrame]:
@@ -366,7 +331,6 @@ class ContinuousFrameReader:
         if self._is_new and self._frames:
             self.device_zero_s = self._device_s + max(float(capture.received_s[0]) - self._last_frame_s, 0.0)
         self._is_new = False
-        self._last_byte_s = float(capture.received_s[-1])
         return self._to_stream_time(self._reader.feed_all(capture))
 
     def expire(self, now_s: float) -> list[TrackerFrame]:

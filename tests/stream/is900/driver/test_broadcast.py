@@ -29,7 +29,8 @@ from harness.stream.polhemus.driver.open_transport import open_transport
 from harness.stream.polhemus.emulator.config import EmulatorConfig
 from harness.stream.polhemus.emulator.server import EmulatorServer
 from harness.stream.polhemus.emulator.udp_broadcast import parse_udp_address
-from harness.stream.recording.recording import RecordingWriter, read_recording
+from harness.stream.recording.recording import read_recording
+from harness.stream.recording.recording_writer import RecordingWriter
 from harness.stream.recording.replay import RecordingStream
 from harness.testing.stream_checks import check_stream
 from tests.long_demo import write_long_demo

@@ -16,7 +16,8 @@ from harness.stream.polhemus.codec.samples import DeviceSamples
 from harness.stream.polhemus.driver.config import DriverTiming
 from harness.stream.polhemus.driver.station_watch import StationWatch
 from harness.stream.polhemus.emulator.config import EmulatorConfig
-from harness.stream.recording.recording import RecordingWriter, read_recording
+from harness.stream.recording.recording import read_recording
+from harness.stream.recording.recording_writer import RecordingWriter
 from harness.stream.recording.replay import RecordingStream
 from tests.stream.is900.driver.bench import START_S, Bench, EmulatedDevice, device_of, frames_for, make_samples
 
