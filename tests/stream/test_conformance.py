@@ -33,6 +33,7 @@ behaviours = ["boxing"]
 test = ["boxing_p1_01"]
 
 [physics]
+constellation.range_m = 2.0
 fusion = { prediction_ms = { head = 50, left_hand = 11 }, enhancement = { torso = 1, left_hand = 2 } }
 """
 
