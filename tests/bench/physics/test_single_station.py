@@ -23,7 +23,7 @@ MORE_SEEDS = tuple(range(101, 131))
     [
         (single_station.rest_row, 1),
         pytest.param(single_station.free_rows, 3, marks=pytest.mark.slow),
-        (single_station.speed_row, 1),
+        pytest.param(single_station.speed_row, 1, marks=pytest.mark.slow),
         (single_station.turned_row, 1),
         pytest.param(single_station.hand_row, 1, marks=pytest.mark.slow),
         (single_station.temperature_row, 1),

@@ -75,7 +75,7 @@ def test_a_second_update_replaces_the_first(tmp_path: Path) -> None:
     assert "stale" not in text
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_verb_puts_the_table_of_a_run_into_a_page(tmp_path: Path) -> None:
     out = planted_run(tmp_path / "run", Plan(behaviours=("walking",), takes=1, methods={"ik": 2.0, "mean_pose": 8.0}))
     page = tmp_path / "README.md"
