@@ -191,6 +191,17 @@ def test_a_fix_is_confirmed_by_four_emitters() -> None:
         assert (quality(outputs) > 0.0).any() == confirmed
 
 
+def test_a_suspect_station_is_sure_again_with_three_emitters() -> None:
+    measured, _ = noisy(free_station(8.0, 3, speed=0.0), 3, Inertial())
+    slot = np.arange(len(measured.range_m))
+    heard = (slot < 4 * SLOTS_PER_S) | ((slot > 5 * SLOTS_PER_S) & np.isin(slot % 9, (0, 1, 4)))
+    some = np.where(heard[:, None], measured.range_m, np.nan)
+    outputs = run(new_filter(fusion=Fusion()), replace(measured, range_m=some))
+    second = outputs.tick[:, 0] / TICK_HZ
+    assert not quality(outputs)[(second > 4.8) & (second < 5.0)].any()
+    assert (quality(outputs)[second > 6.0] > 0.0).all()
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_exchanged_emitters_give_no_confident_error(seed: int) -> None:
     station = free_station(12.0, seed, speed=(0.0, 1.0, 2.0)[seed % 3])
